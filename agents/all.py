@@ -1,0 +1,18 @@
+"""Everybody awake, always."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from agents.base import HandWritten
+from wsn_env.types import Cluster
+from wsn_env.view import View
+
+
+@dataclass(frozen=True)
+class All(HandWritten):
+    """All living nodes; head: the nearest to the prediction."""
+
+    def act(self, view: View) -> Cluster:
+        """Wake everybody, for every row."""
+        return Cluster.of(view.nearest_living(), view.alive)

@@ -1,0 +1,44 @@
+"""What all hand-written policies share: a scenario, and stable-baselines3's predict()."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wsn_env.physics.sensing import detection_probability
+from wsn_env.scenario import Scenario
+from wsn_env.types import Cluster
+from wsn_env.view import View
+
+
+@dataclass(frozen=True)
+class HandWritten:
+    """Base of the hand-written policies: final classes add their parameters as fields and `act`."""
+
+    scenario: Scenario = Scenario()
+
+    def act(self, view: View) -> Cluster:
+        """Choose the clusters of the next period, for every row."""
+        raise TypeError(f"{type(self).__name__} must define act(view)")
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        """stable-baselines3's predict, on environments made with action="cluster", observation="view".
+
+        Args:
+            observation: one environment's dict, or a vector environment's.
+
+        Returns: the action (a dict, or a list of dicts for a vector environment), and `state` as given.
+        """
+        cluster = self.act(View.from_arrays(observation))
+        nodes = np.asarray(observation["battery"]).shape[-1]
+        chosen = np.zeros((len(cluster.head), nodes), dtype=np.int64)
+        rows, slots = np.nonzero(cluster.members >= 0)
+        chosen[rows, cluster.members[rows, slots]] = 1
+        heads = np.maximum(cluster.head, 0)
+        actions = [{"head": np.int64(head), "members": row} for head, row in zip(heads, chosen)]
+        return (actions[0] if np.ndim(observation["battery"]) == 1 else actions), state
+
+    def detection(self, view: View) -> np.ndarray:
+        """(B, S) detection probability of the living nodes at the prediction (eqs. 2-3)."""
+        return np.where(view.alive, detection_probability(view.distance, self.scenario.detection), 0.0)

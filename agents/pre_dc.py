@@ -1,0 +1,64 @@
+"""Prediction-based dynamic clustering (Xiang & Guo, 2013)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from agents.base import HandWritten
+from wsn_env.physics.sensing import joint_detection_probability
+from wsn_env.types import Cluster
+from wsn_env.view import View
+
+
+@dataclass(frozen=True)
+class PreDC(HandWritten):
+    """Keep the cluster while the prediction is sharp and the cluster would detect there; else form a new one.
+
+    The new head is the living node nearest to the prediction that has the energy for a handover and one period; its
+    neighbours join in order of detection probability until the joint probability exceeds theta.
+
+    Differs from the paper: as printed only E >= Phi0 ends a cluster, so that one that the target has left keeps
+    waiting; here the joint detection probability at the prediction must also stay at theta or above.
+    """
+
+    theta: float = 0.9  # theta_d: joint detection probability wanted
+    phi0_m: float = 2.0  # Phi0: prediction sd from which the cluster is formed anew [m]
+
+    def act(self, view: View) -> Cluster:
+        """Keep or form, for every row."""
+        p = self.detection(view)
+        standing = joint_detection_probability(np.where(view.member, p, 0.0))
+        keep = (view.spread_m < self.phi0_m) & (standing >= self.theta) & (view.head >= 0)
+        head, chosen = self._form(view, p)
+        return Cluster.of(
+            np.where(keep, view.head, head), np.where(keep[:, None], view.member, chosen)
+        )
+
+    def _form(self, view: View, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Heads (B,) and members (B, S) of new clusters."""
+        able = view.battery >= self._head_energy_j(p)[:, None]
+        able = np.where(able.any(axis=1)[:, None], able, view.alive)
+        head = np.where(able.any(axis=1), np.where(able, view.distance, np.inf).argmin(axis=1), -1)
+
+        # Nearest first is by probability first; the head goes before all.
+        rank = view.distance.copy()
+        living = np.flatnonzero(head >= 0)
+        rank[living, head[living]] = -1.0
+        order = np.argsort(np.where(view.alive, rank, np.inf), axis=1, kind="stable")
+        sorted_p = np.take_along_axis(p, order, axis=1)
+        before = 1.0 - np.cumprod(1.0 - sorted_p, axis=1)
+        before = np.concatenate([np.zeros((len(p), 1)), before[:, :-1]], axis=1)
+        joins = (sorted_p > 0) & (before <= self.theta)
+        chosen = np.zeros_like(joins)
+        np.put_along_axis(chosen, order, joins, axis=1)
+        return head, chosen
+
+    def _head_energy_j(self, p: np.ndarray) -> np.ndarray:
+        """(B,) energy of a handover (received, and passed on across the sensing range) and of hearing one period."""
+        r = self.scenario.radio
+        reach = 2 * self.scenario.detection.reach_m
+        send = 1e-9 * r.tx_nj_per_bit + 1e-12 * r.amplifier_pj_per_bit_m2 * reach**2
+        receive = 1e-9 * r.rx_nj_per_bit
+        return self.scenario.handover_bits * (send + receive) + r.report_bits * receive * (p > 0).sum(axis=1)

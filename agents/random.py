@@ -1,0 +1,27 @@
+"""A random cluster near the prediction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from agents.base import HandWritten
+from wsn_env.draws import uniforms
+from wsn_env.types import Cluster
+from wsn_env.view import View
+
+
+@dataclass(frozen=True)
+class Random(HandWritten):
+    """Among the living nodes that can detect at the prediction, each is a member with probability one half and any may
+    be the head; the nearest living node leads where none can. Draws on the view's luck, so it is repeatable."""
+
+    def act(self, view: View) -> Cluster:
+        """Throw the dice, for every row."""
+        able = self.detection(view) > 0
+        nodes = able.shape[1]
+        u = uniforms(view.luck, 2 * nodes)
+        head = np.where(able, u[:, :nodes], -1.0).argmax(axis=1)
+        head = np.where(able.any(axis=1), head, view.nearest_living())
+        return Cluster.of(head, able & (u[:, nodes:] < 0.5))

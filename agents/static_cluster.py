@@ -1,0 +1,18 @@
+"""Every node that can detect is awake."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from agents.base import HandWritten
+from wsn_env.types import Cluster
+from wsn_env.view import View
+
+
+@dataclass(frozen=True)
+class StaticCluster(HandWritten):
+    """All living nodes that can detect at the prediction; head: the nearest to it."""
+
+    def act(self, view: View) -> Cluster:
+        """Wake them, for every row."""
+        return Cluster.of(view.nearest_living(), self.detection(view) > 0)

@@ -1,0 +1,42 @@
+"""wsn_env: wireless sensor networks that track a moving target, as Gymnasium environments.
+
+    import gymnasium as gym, wsn_env
+    env = gym.make("wsn_env/PreDC-v0", lam=4.0)
+    envs = gym.make_vec("wsn_env/PreDC-v0", num_envs=64, vectorization_mode="vector_entry_point")
+"""
+
+import importlib
+
+from wsn_env.registration import register_envs
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "Scenario": "wsn_env.scenario",
+    "ScenarioError": "wsn_env.scenario",
+    "World": "wsn_env.world",
+    "View": "wsn_env.view",
+    "State": "wsn_env.types",
+    "Cluster": "wsn_env.types",
+    "Outcome": "wsn_env.types",
+    "ClusterEnv": "wsn_env.env",
+    "ClusterVectorEnv": "wsn_env.vector_env",
+    "evaluate": "wsn_env.evaluation",
+    "make_policy": "wsn_env.policies",
+    "register_envs": "wsn_env.registration",
+}
+__all__ = ["__version__", *_HOMES]
+
+
+def __getattr__(name: str):
+    """Load the public names when they are first used, so that importing the package stays cheap (PEP 562)."""
+    if name in _HOMES:
+        return getattr(importlib.import_module(_HOMES[name]), name)
+    raise AttributeError(f"module 'wsn_env' has no attribute {name!r}")
+
+
+def __dir__():
+    return sorted(__all__)
+
+
+register_envs()

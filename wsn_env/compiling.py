@@ -1,0 +1,85 @@
+"""How kernels are compiled: `kernel` for what Python calls, `piece` for what kernels are made of.
+
+Strict by construction: no fastmath, no BLAS, no libm. The GIL is released, so that `over_rows` can share a
+batch among threads; rows never meet, so the number of threads cannot change a bit.
+"""
+
+import functools
+import hashlib
+import os
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numba
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+PACKAGE = Path(__file__).parent
+SERIAL_ROWS = 8  # up to here one thread is faster than handing work out
+
+piece = numba.njit(error_model="numpy", nogil=True)
+
+
+def kernel(function):
+    """Compile a function for Python to call, cached on disk."""
+    dispatcher = piece(function)
+    dispatcher._cache = _PackageCache(function)
+    return dispatcher
+
+
+class _PackageCache(FunctionCache):
+    """Numba's cache, stale as soon as *any* file with kernels changes.
+
+    Numba looks at the kernel's own file only and would serve old code after an edit in a file of its pieces.
+    """
+
+    def __init__(self, function):
+        super().__init__(function)
+        self._cache_file = IndexDataCacheFile(
+            cache_path=self._cache_path, filename_base=self._impl.filename_base, source_stamp=_stamp()
+        )
+
+    def load_overload(self, sig, target_context):
+        found = super().load_overload(sig, target_context)
+        if found is None:
+            _announce()
+        return found
+
+
+@functools.cache
+def _stamp() -> str:
+    texts = (path.read_bytes() for path in sorted(PACKAGE.rglob("*.py")))
+    return hashlib.sha256(b"".join(text for text in texts if b"compiling" in text)).hexdigest()
+
+
+@functools.cache
+def _announce() -> None:
+    print("wsn_env: compiling (once on this machine, up to a minute) ...", file=sys.stderr, flush=True)
+
+
+_pools: dict[int, ThreadPoolExecutor] = {}
+os.register_at_fork(after_in_child=_pools.clear)  # a child has none of its parent's threads
+
+
+def over_rows(kernel, rows: int, threads: int, *arguments) -> None:
+    """Call kernel(start, stop, *arguments) over 0..rows, shared among threads.
+
+    Args:
+        kernel: works on rows start..stop - 1 only.
+        rows: B.
+        threads: how many to use at most; a small batch stays in the caller's.
+    """
+    if threads == 1 or rows <= SERIAL_ROWS:
+        kernel(0, rows, *arguments)
+        return
+    if threads not in _pools:
+        _pools[threads] = ThreadPoolExecutor(threads, thread_name_prefix="wsn_env")
+    bounds = [rows * i // threads for i in range(threads + 1)]
+    jobs = [_pools[threads].submit(kernel, a, b, *arguments) for a, b in zip(bounds, bounds[1:]) if b > a]
+    for job in jobs:
+        job.result()
+
+
+def available_threads() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,0 +1,142 @@
+"""The single environment: a World with one row."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+from wsn_env import draws
+from wsn_env.interface import Interface, Settings
+from wsn_env.interface.render import frame
+from wsn_env.scenario import Scenario
+from wsn_env.types import Outcome, State
+from wsn_env.view import View
+from wsn_env.world import World
+
+
+def resolve(scenario: str | Scenario, overrides: dict[str, Any]) -> Scenario:
+    """A scenario from a name or a value, with overrides by quantity; an unknown one raises and suggests."""
+    if isinstance(scenario, Scenario):
+        return scenario.override(**overrides)
+    return Scenario.named(scenario, **overrides)
+
+
+def measures(outcome: Outcome, state: State, reward: np.ndarray) -> dict[str, np.ndarray]:
+    """The info of a period, (B, ...) each. It carries truth: for loggers only, never for policies."""
+    return {
+        "error_m": outcome.error_m,
+        "energy_mj": outcome.energy_mj,
+        "reward_error": reward + state.lam * outcome.energy_mj,
+        "reward_energy": -state.lam * outcome.energy_mj,
+        "members": outcome.members,
+        "delivered": outcome.delivered,
+        "dropped": outcome.dropped,
+        "handover": outcome.handover.astype(bool),
+        "searched": outcome.searched.astype(bool),
+        "n_eff": state.belief.n_eff.copy(),
+        "posterior_rms_m": outcome.posterior_rms_m,
+        "alive": outcome.alive,
+        "target_m": outcome.target_m,
+        "estimate_m": outcome.estimate_m,
+    }
+
+
+class ClusterEnv(gym.Env):
+    """Choose a cluster each period; the reward is minus (error + lam * energy).
+
+    Args:
+        scenario: an id such as "PreDC-v0", or a Scenario.
+        action: "menu" | "subset" | "nodes" | "cluster".
+        observation: "candidates" | "dict" | "view".
+        reward: "error" (the mission's) | "belief" (lower variance, for training only).
+        order: "nearest" | "information", the menu's order of merit.
+        candidates: K, how many nodes actions and observations consider.
+        render_mode: None | "rgb_array".
+        overrides: any quantity of the scenario: `nodes=400, particles=1000, lam=(0.3, 30), motion="sine"`.
+
+    An episode is truncated at the horizon and never terminates: a lost track or a dead network goes on.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
+
+    def __init__(
+        self,
+        scenario: str | Scenario = "PreDC-v0",
+        action: str = "menu",
+        observation: str = "candidates",
+        reward: str = "error",
+        order: str = "nearest",
+        candidates: int = Settings.candidates,
+        render_mode: str | None = None,
+        **overrides,
+    ):
+        check_render_mode(render_mode, self.metadata)
+        self.scenario = resolve(scenario, overrides)
+        self.interface = Interface(self.scenario, Settings(action, observation, reward, order, candidates))
+        self.world = World(self.scenario, threads=1)
+        self.render_mode = render_mode
+        self.action_space = self.interface.action.space
+        self.observation_space = self.interface.observation.space
+        self._state: State | None = None
+        self._view: View | None = None
+        self._squares = 0.0
+
+    def reset(self, *, seed: int | None = None, options: dict | None = None):
+        """A new episode: seed fixes field, track and every draw."""
+        super().reset(seed=seed)
+        empty = self.world.reset([0]) if self._state is None else self._state
+        key = draws.episode_key(self.np_random)
+        self._state, outcome = self.world.restart(empty, [True], np.array([key]), donate=True)
+        self._squares = 0.0
+        return self._observe(), _first(measures(outcome, self._state, -outcome.error_m))
+
+    def step(self, action):
+        """One period. Returns observation, reward, terminated (never), truncated, info."""
+        if self._state is None:
+            raise gym.error.ResetNeeded("call reset() before step()")
+        if self._state.period[0] >= self.scenario.periods:
+            raise gym.error.ResetNeeded(f"the episode ended after {self.scenario.periods} periods: call reset()")
+        if not self.action_space.contains(action):
+            raise ValueError(f"action {action!r} is not in {self.action_space}")
+        cluster = self.interface.action.cluster(_batched(action), self._view)
+        self._state, outcome = self.world.step(self._state, cluster, donate=True)
+        reward = self.interface.reward(outcome, self._state.lam)
+        self._squares += float(outcome.error_m[0]) ** 2
+        truncated = bool(self._state.period[0] >= self.scenario.periods)
+        info = _first(measures(outcome, self._state, reward))
+        if truncated:
+            info["episode_rms_m"] = (self._squares / self.scenario.periods) ** 0.5
+        return self._observe(), float(reward[0]), False, truncated, info
+
+    def action_masks(self) -> np.ndarray:
+        """Which entries of the action make sense now (flat bool, as sb3-contrib's MaskablePPO wants them)."""
+        return self.interface.action.masks(self._view)[0]
+
+    def render(self):
+        """A frame (H, W, 3) uint8 of the present state."""
+        if self.render_mode is None or self._state is None:
+            gym.logger.warn("render() needs render_mode='rgb_array' and a reset environment")
+            return None
+        return frame(self._state, self.scenario)
+
+    def _observe(self):
+        self._view = View.of(self._state)
+        arrays = self.interface.observation.encode(self._view)
+        return _first(arrays) if isinstance(arrays, dict) else arrays[0]
+
+
+def check_render_mode(render_mode: str | None, metadata: dict) -> None:
+    """Raise ValueError unless the mode is one of the metadata's."""
+    if render_mode is not None and render_mode not in metadata["render_modes"]:
+        raise ValueError(f"render_mode = {render_mode!r}: allowed are None, {', '.join(metadata['render_modes'])}")
+
+
+def _first(arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+    """The only row of (1, ...) arrays: arrays, or plain numbers."""
+    return {name: value[0] if value.ndim > 1 else value[0].item() for name, value in arrays.items()}
+
+
+def _batched(action):
+    return {k: np.asarray(v)[None] for k, v in action.items()} if isinstance(action, dict) else np.asarray(action)[None]

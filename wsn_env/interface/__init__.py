@@ -1,0 +1,34 @@
+"""What learners meet: actions (spaces <-> Cluster), observations (View -> arrays), rewards, pictures."""
+
+from dataclasses import dataclass
+
+from wsn_env.interface.actions import make_action
+from wsn_env.interface.observations import make_observation
+from wsn_env.interface.rewards import REWARDS, make_reward
+from wsn_env.scenario import Scenario
+
+CANDIDATES = 12
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How an environment speaks, whatever the scenario."""
+
+    action: str = "menu"
+    observation: str = "candidates"
+    reward: str = "error"
+    order: str = "nearest"
+    candidates: int = CANDIDATES
+
+
+class Interface:
+    """The three translations of an environment, bound to a scenario."""
+
+    def __init__(self, scenario: Scenario, settings: Settings):
+        self.settings = settings
+        self.action = make_action(settings.action, scenario, settings.order, settings.candidates)
+        self.observation = make_observation(settings.observation, scenario, settings.candidates)
+        self.reward = make_reward(settings.reward)
+
+
+__all__ = ["CANDIDATES", "REWARDS", "Interface", "Settings"]

@@ -1,0 +1,159 @@
+"""Action spaces and their translation into a Cluster. Each takes (B, ...) actions and a View."""
+
+from __future__ import annotations
+
+import numpy as np
+from gymnasium import spaces
+
+from wsn_env.interface.merit import ORDERS, order_by_information
+from wsn_env.physics.constants import constants
+from wsn_env.scenario import Scenario, suggest
+from wsn_env.types import Cluster
+from wsn_env.view import View
+
+MENU_MEMBERS = 8  # the menu's largest number of further members
+
+
+class MenuAction:
+    """Discrete(19): 0 keeps the cluster as it is; 1 + n keeps the head, 10 + n moves it to the best node, each with
+    the n best further members, n = 0..8. Without a living head, keeping it means moving it."""
+
+    def __init__(self, scenario: Scenario, order: str, candidates: int):
+        if candidates <= MENU_MEMBERS:
+            raise ValueError(f"candidates = {candidates}: the menu needs at least {MENU_MEMBERS + 1}")
+        self.space = spaces.Discrete(1 + 2 * (MENU_MEMBERS + 1))
+        self._order, self._candidates = order, candidates
+        self._constants = constants(scenario)
+
+    def cluster(self, action, view: View) -> Cluster:
+        """The cluster that the menu's entries name."""
+        action = np.asarray(action).reshape(-1)
+        keep, moves = action == 0, action > MENU_MEMBERS + 1
+        count = np.where(keep, 0, (action - 1) % (MENU_MEMBERS + 1))
+        moves = (moves | (view.head < 0)) & ~(keep & (view.head >= 0))
+        ordered = self._ordered(np.where(moves, -1, view.head), view)
+        head = np.where(moves, ordered[:, 0], view.head)
+        # A moved head is the first of the order; a kept one has been left out of it.
+        slots = np.arange(MENU_MEMBERS + 1)
+        wanted = slots < (count + moves)[:, None]
+        members = np.where(wanted, ordered[:, : MENU_MEMBERS + 1], -1).astype(np.int32)
+        if keep.any():
+            members = _with_standing(members, keep & (view.head >= 0), view)
+        return Cluster(head, members)
+
+    def _ordered(self, heads, view: View) -> np.ndarray:
+        """(B, K) candidates in order of merit without the given heads, -1 at the end."""
+        nodes = view.nearest(self._candidates)[0]
+        if self._order == "nearest":
+            others = nodes != heads[:, None]
+            place = np.argsort(~others, axis=1, kind="stable")
+            return np.where(np.take_along_axis(others, place, axis=1), np.take_along_axis(nodes, place, axis=1), -1)
+        ordered = np.empty_like(nodes)
+        order_by_information(
+            0, len(nodes), self._constants, view.positions, heads, view.predicted_mean, view.predicted_cov, nodes, ordered
+        )
+        return ordered
+
+    def masks(self, view: View) -> np.ndarray:
+        """(B, 19) bool: what differs from all smaller entries. Counts beyond the living, and keeping no head, do not."""
+        living = (view.nearest(self._candidates)[0] >= 0).sum(axis=1)
+        n = np.arange(MENU_MEMBERS + 1)
+        standing = view.head >= 0
+        valid = np.ones((len(living), self.space.n), dtype=bool)
+        valid[:, 1 : MENU_MEMBERS + 2] = standing[:, None] & (n <= np.maximum(living - 1, 0)[:, None])
+        valid[:, MENU_MEMBERS + 2 :] = n <= (living - 1)[:, None]
+        return valid
+
+
+def _with_standing(members, keep, view: View) -> np.ndarray:
+    """Put the standing members into the rows where `keep`."""
+    count = np.where(keep, view.network.n_members, 0)
+    most = count.max()
+    out = np.full((len(members), max(members.shape[1], most)), -1, dtype=np.int32)
+    out[~keep, : members.shape[1]] = members[~keep]
+    rows, slots = np.nonzero(np.arange(most) < count[:, None])
+    out[rows, slots] = view.network.members[rows, slots]
+    return out
+
+
+class SubsetAction:
+    """MultiDiscrete [K + 1] + [2] * K: the head (0: keep it, j: the j-th nearest), and which of the K nearest are in."""
+
+    def __init__(self, scenario: Scenario, order: str, candidates: int):
+        self.space = spaces.MultiDiscrete([candidates + 1] + [2] * candidates)
+        self._candidates = candidates
+
+    def cluster(self, action, view: View) -> Cluster:
+        """The cluster that the entries name."""
+        action = np.asarray(action).reshape(len(view.period), -1)
+        nodes = view.nearest(self._candidates)[0]
+        named = np.take_along_axis(nodes, np.maximum(action[:, :1] - 1, 0), axis=1)[:, 0]
+        head = np.where(action[:, 0] == 0, view.head, named)
+        return Cluster(head, np.where(action[:, 1:] == 1, nodes, -1).astype(np.int32))
+
+    def masks(self, view: View) -> np.ndarray:
+        """(B, K + 1 + 2 K) bool: heads, then out/in for each candidate."""
+        exists = view.nearest(self._candidates)[0] >= 0
+        keep = (view.head >= 0) | ~exists.any(axis=1)
+        choice = np.stack([np.ones_like(exists), exists], axis=2).reshape(len(exists), -1)
+        return np.concatenate([keep[:, None], exists, choice], axis=1)
+
+
+class NodesAction:
+    """MultiDiscrete([2] * S): who is awake. The head is the chosen node nearest to the prediction; if none is chosen,
+    the living node nearest to it, alone."""
+
+    def __init__(self, scenario: Scenario, order: str, candidates: int):
+        self.space = spaces.MultiDiscrete([2] * scenario.field.nodes)
+
+    def cluster(self, action, view: View) -> Cluster:
+        """The cluster of the chosen nodes."""
+        chosen = np.asarray(action).reshape(len(view.period), -1) == 1
+        living = chosen & view.alive
+        distance = np.where(living, view.distance, np.inf)
+        head = np.where(living.any(axis=1), distance.argmin(axis=1), view.nearest_living())
+        return Cluster.of(head, chosen)
+
+    def masks(self, view: View) -> np.ndarray:
+        """(B, 2 S) bool: out/in for each node; the dead can only stay out."""
+        return np.stack([np.ones_like(view.alive), view.alive], axis=2).reshape(len(view.period), -1)
+
+
+class ClusterAction:
+    """Dict(head: Discrete(S), members: MultiDiscrete([2] * S)): the full choice."""
+
+    def __init__(self, scenario: Scenario, order: str, candidates: int):
+        nodes = scenario.field.nodes
+        self.space = spaces.Dict({"head": spaces.Discrete(nodes), "members": spaces.MultiDiscrete([2] * nodes)})
+
+    def cluster(self, action, view: View) -> Cluster:
+        """The choice itself; a list of single choices is taken too."""
+        if isinstance(action, (list, tuple)) or getattr(action, "dtype", None) == object:
+            action = {name: np.stack([one[name] for one in action]) for name in ("head", "members")}
+        rows = len(view.period)
+        return Cluster.of(
+            np.asarray(action["head"]).reshape(rows), np.asarray(action["members"]).reshape(rows, -1) == 1
+        )
+
+    def masks(self, view: View) -> np.ndarray:
+        """(B, S + 2 S) bool: heads, then out/in for each node."""
+        choice = np.stack([np.ones_like(view.alive), view.alive], axis=2).reshape(len(view.period), -1)
+        return np.concatenate([view.alive, choice], axis=1)
+
+
+ACTIONS = {"menu": MenuAction, "subset": SubsetAction, "nodes": NodesAction, "cluster": ClusterAction}
+
+
+def make_action(name: str, scenario: Scenario, order: str, candidates: int):
+    """An action by name.
+
+    Raises:
+        ValueError: for an unknown name or order, or too few candidates.
+    """
+    if name not in ACTIONS:
+        raise ValueError(f"action {name!r} is unknown: {suggest(name, ACTIONS)}")
+    if order not in ORDERS:
+        raise ValueError(f"order {order!r} is unknown: {suggest(order, ORDERS)}")
+    if not isinstance(candidates, int) or candidates < 1:
+        raise ValueError(f"candidates = {candidates!r}: must be a whole number, at least 1")
+    return ACTIONS[name](scenario, order, candidates)

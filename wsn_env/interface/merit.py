@@ -1,0 +1,83 @@
+"""The order in which candidates are worth waking: nearest first, or by information gain."""
+
+import numpy as np
+
+from wsn_env.compiling import kernel, piece
+from wsn_env.physics.field import squared_distance
+from wsn_env.physics.sensing import detection_piece, strength
+
+ORDERS = ("nearest", "information")
+
+
+@piece
+def mean_detection(positions, node, mean, cov, c):
+    """Detection probability at the root mean square distance under the belief."""
+    squared = squared_distance(positions, node, mean[0], mean[2]) + 0.5 * (cov[0, 0] + cov[2, 2])
+    return detection_piece(np.sqrt(squared), c)
+
+
+@piece
+def gain(positions, node, mean, cov, p00, p01, p11, c):
+    """Expected drop of the position covariance's trace by one report of `node` [m^2], and the covariance after it.
+
+    Linearised at the prediction. That the node may not detect enters as a measurement noise of R / p.
+
+    Args:
+        p00, p01, p11: position covariance so far, after the nodes already chosen [m^2].
+
+    Returns: gain, and the three entries of the covariance after.
+    """
+    p = max(mean_detection(positions, node, mean, cov, c), 1e-6)
+    r = c.noise * c.noise / p
+    if c.model == 0:
+        s00, s11 = p00 + r, p11 + r
+        det = s00 * s11 - p01 * p01
+        q00 = p00 - (p00 * p00 * s11 - 2.0 * p00 * p01 * p01 + p01 * p01 * s00) / det
+        q11 = p11 - (p01 * p01 * s11 - 2.0 * p01 * p01 * p11 + p11 * p11 * s00) / det
+        q01 = p01 - (p00 * s11 * p01 - p00 * p01 * p11 - p01 * p01 * p01 + p01 * s00 * p11) / det
+        return p00 + p11 - q00 - q11, q00, q01, q11
+    dx = mean[0] - positions[node, 0]
+    dy = mean[2] - positions[node, 1]
+    # The slope of the strength, smoothed over the belief's own width.
+    squared = max(dx * dx + dy * dy + 0.5 * (cov[0, 0] + cov[2, 2]), c.floor_m * c.floor_m)
+    slope = -2.0 * c.slope / squared
+    if c.model != 1:
+        slope *= strength(squared, c)
+    h0, h1 = slope * dx, slope * dy
+    b0, b1 = p00 * h0 + p01 * h1, p01 * h0 + p11 * h1
+    s = h0 * b0 + h1 * b1 + r
+    return (b0 * b0 + b1 * b1) / s, p00 - b0 * b0 / s, p01 - b0 * b1 / s, p11 - b1 * b1 / s
+
+
+@kernel
+def order_by_information(start, stop, cs, positions, heads, means, covs, nodes, ordered):
+    """Greedy order of the candidates: each next one is the best after those before it.
+
+    Args:
+        heads: (B,) a head that senses anyhow and is conditioned on first; -1: none.
+        nodes: (B, K) candidates, -1: none.
+        ordered: (B, K) filled; -1 at the end where candidates are missing or are the head.
+    """
+    c = cs[0]
+    size = nodes.shape[1]
+    used = np.empty(size, np.bool_)
+    for b in range(start, stop):
+        mean, cov = means[b], covs[b]
+        p00, p01, p11 = cov[0, 0], cov[0, 2], cov[2, 2]
+        if heads[b] >= 0:
+            _, p00, p01, p11 = gain(positions[b], heads[b], mean, cov, p00, p01, p11, c)
+        ordered[b] = -1
+        for k in range(size):
+            used[k] = nodes[b, k] < 0 or nodes[b, k] == heads[b]
+        for slot in range(size):
+            best, most, after = -1, -1.0, (p00, p01, p11)
+            for k in range(size):
+                if not used[k]:
+                    g, q00, q01, q11 = gain(positions[b], nodes[b, k], mean, cov, p00, p01, p11, c)
+                    if g > most:
+                        best, most, after = k, g, (q00, q01, q11)
+            if best < 0:
+                break
+            used[best] = True
+            ordered[b, slot] = nodes[b, best]
+            p00, p01, p11 = after

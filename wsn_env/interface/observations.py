@@ -1,0 +1,220 @@
+"""Observations: a View as arrays, finite and clipped. lam is part of every one."""
+
+from __future__ import annotations
+
+import numpy as np
+from gymnasium import spaces
+
+from wsn_env.compiling import kernel
+from wsn_env.interface.merit import gain, mean_detection
+from wsn_env.numerics import log
+from wsn_env.physics.constants import constants
+from wsn_env.physics.field import squared_distance
+from wsn_env.physics.sensing import detection_piece
+from wsn_env.scenario import Scenario, suggest
+from wsn_env.view import View
+
+BELIEF_FEATURES = (
+    "lam",  # log, halved
+    "major_sd",  # log of the position ellipse's axes
+    "minor_sd",
+    "major_radii",  # the same in sensing radii
+    "minor_radii",
+    "axis_cos",  # twice the angle between the major axis and the velocity
+    "axis_sin",
+    "speed",  # m/s
+    "velocity_sd",  # log
+    "silence",  # log probability of the silence since the last report
+    "heard",  # reports in the last period
+    "head_ahead",  # where the head stands, in radii along and across the velocity
+    "head_left",
+    "head_distance",
+    "head_detection",
+    "head_nearest",  # 1: no living node is nearer
+    "members",
+    "joint_detection",  # of the standing cluster at the prediction
+    "sparseness",  # distance of the farthest candidate
+)
+CANDIDATE_FEATURES = (
+    "ahead",  # in radii along and across the velocity, from the prediction
+    "left",
+    "distance",
+    "detection",
+    "head_distance",
+    "member",
+    "head",
+    "battery",  # share left
+    "gain",  # log of the trace's expected drop by this node alone
+)
+BOUND = 10.0
+
+
+@kernel
+def _encode(start, stop, cs, battery_j, view, nodes, distances, belief, candidates):
+    c = cs[0]
+    r = c.radius_m
+    for b in range(start, stop):
+        (lam, log_miss, mean, cov, network, reports) = view
+        positions = network.positions[b]
+        m, p = mean[b], cov[b]
+        head = network.head[b]
+
+        # The position ellipse, and the frame of the velocity.
+        half, off = 0.5 * (p[0, 0] + p[2, 2]), 0.5 * (p[0, 0] - p[2, 2])
+        root = np.sqrt(off * off + p[0, 2] * p[0, 2])
+        major, minor = max(half + root, 1e-6), max(half - root, 1e-6)
+        speed = np.sqrt(m[1] * m[1] + m[3] * m[3])
+        ex, ey = (m[1] / speed, m[3] / speed) if speed > 1e-9 else (1.0, 0.0)
+        cos2, sin2 = (off / root, p[0, 2] / root) if root > 1e-12 else (1.0, 0.0)
+        c2, s2 = ex * ex - ey * ey, 2.0 * ex * ey
+        f = belief[b]
+        f[0] = 0.5 * log(max(lam[b], 1e-3))
+        f[1] = 0.5 * log(major)
+        f[2] = 0.5 * log(minor)
+        f[3] = np.sqrt(major) / r
+        f[4] = np.sqrt(minor) / r
+        f[5] = cos2 * c2 + sin2 * s2
+        f[6] = sin2 * c2 - cos2 * s2
+        f[7] = speed
+        f[8] = 0.5 * log(max(p[1, 1] + p[3, 3], 1e-6))
+        f[9] = 0.2 * log_miss[b]
+        f[10] = 0.25 * reports.count[b]
+        f[11:18] = 0.0
+        if head >= 0:
+            dx, dy = (positions[head, 0] - m[0]) / r, (positions[head, 1] - m[2]) / r
+            f[11] = dx * ex + dy * ey
+            f[12] = dy * ex - dx * ey
+            f[13] = np.sqrt(dx * dx + dy * dy)
+            f[14] = mean_detection(positions, head, m, p, c)
+            f[15] = 1.0 if head == nodes[b, 0] else 0.0
+            f[16] = 0.25 * network.n_members[b]
+            missed = 1.0 - detection_piece(np.sqrt(squared_distance(positions, head, m[0], m[2])), c)
+            for k in range(network.n_members[b]):
+                node = network.members[b, k]
+                missed *= 1.0 - detection_piece(np.sqrt(squared_distance(positions, node, m[0], m[2])), c)
+            f[17] = 1.0 - missed
+        f[18] = distances[b, len(distances[b]) - 1] / r
+
+        j = 0
+        for k in range(nodes.shape[1]):
+            node = nodes[b, k]
+            g = candidates[b, k]
+            g[:] = 0.0
+            if node < 0:
+                g[2] = BOUND
+                continue
+            dx, dy = (positions[node, 0] - m[0]) / r, (positions[node, 1] - m[2]) / r
+            g[0] = dx * ex + dy * ey
+            g[1] = dy * ex - dx * ey
+            g[2] = distances[b, k] / r
+            g[3] = mean_detection(positions, node, m, p, c)
+            if head >= 0:
+                g[4] = np.sqrt(squared_distance(positions, node, positions[head, 0], positions[head, 1])) / r
+            for j in range(network.n_members[b]):
+                if network.members[b, j] == node:
+                    g[5] = 1.0
+            if node == head:
+                g[5] = 1.0
+                g[6] = 1.0
+            g[7] = network.battery[b, node] / battery_j
+            drop = gain(positions, node, m, p, p[0, 0], p[0, 2], p[2, 2], c)[0]
+            g[8] = 0.25 * log(max(drop / (p[0, 0] + p[2, 2] + 1e-12), 1e-6))
+        for i in range(len(f)):
+            f[i] = min(max(f[i], -BOUND), BOUND)
+        for k in range(len(candidates[b])):
+            for i in range(candidates.shape[2]):
+                candidates[b, k, i] = min(max(candidates[b, k, i], -BOUND), BOUND)
+
+
+class CandidatesObservation:
+    """Flat Box float32: BELIEF_FEATURES, then CANDIDATE_FEATURES of the K living nodes nearest to the prediction."""
+
+    def __init__(self, scenario: Scenario, candidates: int):
+        self.size = len(BELIEF_FEATURES)
+        self.shape = (candidates, len(CANDIDATE_FEATURES))
+        self.space = spaces.Box(-BOUND, BOUND, (self.size + candidates * self.shape[1],), np.float32)
+        self._constants = constants(scenario)
+        self._battery_j = scenario.radio.battery_j
+
+    def encode(self, view: View) -> np.ndarray:
+        """(B, n) float32, fresh."""
+        rows = len(view.period)
+        nodes, distances = view.nearest(self.shape[0])
+        belief, candidates = np.empty((rows, self.size)), np.empty((rows, *self.shape))
+        seen = (view.lam, view.log_miss, view.predicted_mean, view.predicted_cov, view.network, view.reports)
+        _encode(0, rows, self._constants, self._battery_j, seen, nodes, distances, belief, candidates)
+        out = np.empty((rows, self.space.shape[0]), np.float32)
+        out[:, : self.size] = belief
+        out[:, self.size :] = candidates.reshape(rows, -1)
+        return out
+
+
+class DictObservation:
+    """The same features under names: belief (19,), candidates (K, 9), and lam (1,) [m/mJ]."""
+
+    def __init__(self, scenario: Scenario, candidates: int):
+        self._flat = CandidatesObservation(scenario, candidates)
+        high = max(scenario.lam_range[1], 1.0)
+        self.space = spaces.Dict(
+            {
+                "belief": spaces.Box(-BOUND, BOUND, (self._flat.size,), np.float32),
+                "candidates": spaces.Box(-BOUND, BOUND, self._flat.shape, np.float32),
+                "lam": spaces.Box(0.0, high, (1,), np.float32),
+            }
+        )
+
+    def encode(self, view: View) -> dict[str, np.ndarray]:
+        """A dict of (B, ...) float32, fresh."""
+        flat = self._flat.encode(view)
+        return {
+            "belief": flat[:, : self._flat.size].copy(),
+            "candidates": flat[:, self._flat.size :].reshape(len(flat), *self._flat.shape).copy(),
+            "lam": np.minimum(view.lam[:, None].astype(np.float32), self.space["lam"].high[0]),
+        }
+
+
+class ViewObservation:
+    """Everything a network could know, as float64: enough for every hand-written policy (`View.from_arrays`)."""
+
+    def __init__(self, scenario: Scenario, candidates: int):
+        nodes, side, far = scenario.field.nodes, scenario.field.side_m, 1e9
+
+        def box(low, high, *shape):
+            return spaces.Box(low, high, shape, np.float64)
+
+        self.space = spaces.Dict(
+            {
+                "period": spaces.Discrete(scenario.periods + 1),
+                "lam": box(0.0, max(scenario.lam_range[1], 1.0), 1),
+                "luck": spaces.Discrete(2**32),
+                "log_miss": box(-far, 0.0, 1),
+                "mean": box(-far, far, 4),
+                "cov": box(-far, far, 4, 4),
+                "predicted_mean": box(-far, far, 4),
+                "predicted_cov": box(-far, far, 4, 4),
+                "positions": box(0.0, side, nodes, 2),
+                "battery": box(0.0, scenario.radio.battery_j, nodes),
+                "head": spaces.Discrete(nodes + 1, start=-1),
+                "member": spaces.Box(0, 1, (nodes,), np.int8),
+                "detected": spaces.Box(0, 1, (nodes,), np.int8),
+                "measured": box(-far, far, nodes, 2),
+            }
+        )
+
+    def encode(self, view: View) -> dict[str, np.ndarray]:
+        """A dict of (B, ...) arrays, fresh."""
+        return view.as_arrays()
+
+
+OBSERVATIONS = {"candidates": CandidatesObservation, "dict": DictObservation, "view": ViewObservation}
+
+
+def make_observation(name: str, scenario: Scenario, candidates: int):
+    """An observation by name.
+
+    Raises:
+        ValueError: for an unknown name.
+    """
+    if name not in OBSERVATIONS:
+        raise ValueError(f"observation {name!r} is unknown: {suggest(name, OBSERVATIONS)}")
+    return OBSERVATIONS[name](scenario, candidates)

@@ -1,0 +1,37 @@
+"""Rewards: minus (error + lam * energy), in metres."""
+
+import numpy as np
+
+from wsn_env.scenario import suggest
+from wsn_env.types import Outcome
+
+DISBELIEF = 3.0  # a true error so many times the believed one is no accident
+
+
+def error_cost(outcome: Outcome) -> np.ndarray:
+    """The mission's: the distance between estimate and target [m]."""
+    return outcome.error_m
+
+
+def belief_cost(outcome: Outcome) -> np.ndarray:
+    """The error that the belief expects, of much lower variance; the true one where the belief is plainly wrong [m].
+
+    For training only.
+    """
+    wrong = outcome.error_m > DISBELIEF * outcome.posterior_rms_m
+    return np.where(wrong, outcome.error_m, outcome.posterior_rms_m)
+
+
+REWARDS = {"error": error_cost, "belief": belief_cost}
+
+
+def make_reward(name: str):
+    """reward(outcome, lam) -> (B,), for one of REWARDS.
+
+    Raises:
+        ValueError: for an unknown name.
+    """
+    if name not in REWARDS:
+        raise ValueError(f"reward {name!r} is unknown: {suggest(name, REWARDS)}")
+    cost = REWARDS[name]
+    return lambda outcome, lam: -(cost(outcome) + lam * outcome.energy_mj)

@@ -1,0 +1,251 @@
+"""How the target moves: a motion is a function from a key to a whole track.
+
+The track of an episode does not depend on what the network does, so it is drawn at the start: (periods + 1, 4)
+true states (x, vx, y, vy) in m and m/s. All tracks stay inside the field.
+"""
+
+import csv
+from dataclasses import fields
+
+import numpy as np
+
+from wsn_env import draws
+from wsn_env.compiling import piece
+from wsn_env.numerics import HALF_PI, sincos
+from wsn_env.scenario import MOTIONS, Recorded, Scenario, ScenarioError
+
+CROSSING, STRAIGHT, SINE, CIRCLE, TURNS, WAYPOINT, RECORDED = range(len(MOTIONS))
+CODES = dict(zip(MOTIONS.values(), range(len(MOTIONS))))
+
+
+def motion_parameters(scenario: Scenario) -> tuple[int, np.ndarray, np.ndarray]:
+    """A scenario's motion for `draw_track`: its code, its numbers (4,), its recordings (N, periods + 1, 4)."""
+    motion = scenario.motion
+    numbers = np.zeros(4)
+    recordings = np.zeros((1, scenario.periods + 1, 4))
+    if isinstance(motion, Recorded):
+        recordings = np.stack([read_track(path, scenario) for path in motion.tracks])
+    else:
+        values = [getattr(motion, item.name) for item in fields(motion)]
+        numbers[: len(values)] = values
+    _check_room(scenario)
+    return CODES[type(motion)], numbers, recordings
+
+
+def _check_room(scenario: Scenario) -> None:
+    motion, side = scenario.motion, scenario.field.side_m
+    name = type(motion).__name__
+    if name == "Crossing":
+        room = (side - 2 * motion.margin_m) * 2**0.5
+        if motion.crossing_m > 0.9 * room:
+            raise ScenarioError(
+                f"Crossing.crossing_m = {motion.crossing_m}: must be at most {0.9 * room:.1f} m in a field of {side} m"
+                f" with a margin of {motion.margin_m} m"
+            )
+    if name == "Circle" and motion.circle_m > side / 2:
+        raise ScenarioError(f"Circle.circle_m = {motion.circle_m}: must be at most half the side, {side / 2} m")
+    if name == "Sine" and motion.amplitude_m > side / 2:
+        raise ScenarioError(f"Sine.amplitude_m = {motion.amplitude_m}: must be at most half the side, {side / 2} m")
+
+
+@piece
+def draw_track(code, numbers, recordings, stream, period_s, side_m, track):
+    """Fill `track` (periods + 1, 4) with the true states."""
+    if code == CROSSING:
+        _cross(stream, numbers[0], numbers[1], numbers[2], period_s, side_m, track)
+    elif code == STRAIGHT:
+        _go_straight(numbers[0], numbers[1], period_s, track)
+    elif code == SINE:
+        _swing(numbers[0], numbers[1], numbers[2], period_s, side_m, track)
+    elif code == CIRCLE:
+        _circle(numbers[0], numbers[1], period_s, side_m, track)
+    elif code == TURNS:
+        _turn(stream, numbers[0], numbers[1], period_s, side_m, track)
+    elif code == WAYPOINT:
+        _visit(stream, numbers[0], period_s, side_m, track)
+    else:
+        track[:] = recordings[int(draws.uniform(stream, 0) * len(recordings))]
+    for state in track:
+        _reflect(state, 0, side_m)
+        _reflect(state, 2, side_m)
+
+
+@piece
+def _reflect(state, axis, side_m):
+    """Fold a coordinate back into [0, side], as a mirror at the border would."""
+    x = state[axis] - 2.0 * side_m * np.floor(state[axis] / (2.0 * side_m))
+    if x > side_m:
+        x = 2.0 * side_m - x
+        state[axis + 1] = -state[axis + 1]
+    state[axis] = min(max(x, 0.0), side_m)
+
+
+@piece
+def advance(state, period_s, ax, ay, out):
+    """Constant velocity with a constant acceleration over the period: F x + G a (eqs. 6, 8)."""
+    half = 0.5 * period_s * period_s
+    out[0] = state[0] + period_s * state[1] + half * ax
+    out[1] = state[1] + period_s * ax
+    out[2] = state[2] + period_s * state[3] + half * ay
+    out[3] = state[3] + period_s * ay
+
+
+@piece
+def _cross(stream, margin_m, crossing_m, acceleration_ms2, period_s, side_m, track):
+    steps = len(track) - 1
+    inner = side_m - 2.0 * margin_m
+    draw = 0
+    while True:  # the first pair of points that lie far enough apart
+        x0 = margin_m + inner * draws.uniform(stream, draw)
+        y0 = margin_m + inner * draws.uniform(stream, draw + 1)
+        x1 = margin_m + inner * draws.uniform(stream, draw + 2)
+        y1 = margin_m + inner * draws.uniform(stream, draw + 3)
+        if (x1 - x0) ** 2 + (y1 - y0) ** 2 >= crossing_m**2:
+            break
+        draw += 4
+    duration = steps * period_s
+    track[0] = np.array((x0, (x1 - x0) / duration, y0, (y1 - y0) / duration))
+    for k in range(steps):
+        ax, ay = draws.normal_pair(stream, 1_000_000 + k)
+        advance(track[k], period_s, acceleration_ms2 * ax, acceleration_ms2 * ay, track[k + 1])
+
+
+@piece
+def _go_straight(from_m, velocity_ms, period_s, track):
+    for k in range(len(track)):
+        x = from_m + velocity_ms * period_s * k
+        track[k] = np.array((x, velocity_ms, x, velocity_ms))
+
+
+@piece
+def _swing(speed_ms, amplitude_m, turn_s, period_s, side_m, track):
+    w = 4.0 * HALF_PI / turn_s
+    for k in range(len(track)):
+        t = k * period_s
+        s, c = sincos(w * t)
+        track[k] = np.array((0.05 * side_m + speed_ms * t, speed_ms, side_m / 2 + amplitude_m * s, amplitude_m * w * c))
+
+
+@piece
+def _circle(circle_m, turn_s, period_s, side_m, track):
+    w = 4.0 * HALF_PI / turn_s
+    for k in range(len(track)):
+        s, c = sincos(w * k * period_s)
+        track[k] = np.array((side_m / 2 + circle_m * c, -circle_m * w * s, side_m / 2 + circle_m * s, circle_m * w * c))
+
+
+@piece
+def _turn(stream, speed_ms, turn_probability, period_s, side_m, track):
+    track[0, 0] = side_m * (0.1 + 0.8 * draws.uniform(stream, 0))
+    track[0, 2] = side_m * (0.1 + 0.8 * draws.uniform(stream, 1))
+    heading = 4.0 * HALF_PI * draws.uniform(stream, 2)
+    for k in range(len(track)):
+        if k > 0:
+            if draws.uniform(stream, 2 * k + 1) < turn_probability:
+                heading += 2.0 * HALF_PI * (draws.uniform(stream, 2 * k + 2) - 0.5)
+            advance(track[k - 1], period_s, 0.0, 0.0, track[k])
+        s, c = sincos(heading)
+        if track[k, 0] < 0.0 or track[k, 0] > side_m:  # the mirror turns the heading too
+            c = -c
+        if track[k, 2] < 0.0 or track[k, 2] > side_m:
+            s = -s
+        _reflect(track[k], 0, side_m)
+        _reflect(track[k], 2, side_m)
+        heading = _heading(s, c)
+        track[k, 1] = speed_ms * c
+        track[k, 3] = speed_ms * s
+
+
+@piece
+def _heading(s, c):
+    """The angle in (-pi, pi] of a unit vector, by Newton's steps from the octant (no libm)."""
+    angle = 0.0
+    if c < 0.0:
+        angle = 2.0 * HALF_PI if s >= 0.0 else -2.0 * HALF_PI
+    if abs(s) > abs(c):
+        angle = HALF_PI if s >= 0.0 else -HALF_PI
+    for _ in range(6):
+        si, co = sincos(angle)
+        angle += s * co - c * si
+    return angle
+
+
+@piece
+def _visit(stream, speed_ms, period_s, side_m, track):
+    x = side_m * draws.uniform(stream, 0)
+    y = side_m * draws.uniform(stream, 1)
+    goal_x, goal_y = x, y
+    draw = 2
+    for k in range(len(track)):
+        if k > 0:
+            left = speed_ms * period_s
+            while True:
+                distance = np.sqrt((goal_x - x) ** 2 + (goal_y - y) ** 2)
+                if distance > left:
+                    x += (goal_x - x) * left / distance
+                    y += (goal_y - y) * left / distance
+                    break
+                left -= distance
+                x, y = goal_x, goal_y
+                goal_x = side_m * draws.uniform(stream, draw)
+                goal_y = side_m * draws.uniform(stream, draw + 1)
+                draw += 2
+        distance = np.sqrt((goal_x - x) ** 2 + (goal_y - y) ** 2)
+        scale = speed_ms / distance if distance > 0.0 else 0.0
+        track[k] = np.array((x, scale * (goal_x - x), y, scale * (goal_y - y)))
+
+
+def read_track(path: str, scenario: Scenario) -> np.ndarray:
+    """A recorded track (periods + 1, 4), resampled linearly to the horizon, scaled and centred on request.
+
+    Args:
+        path: CSV with a header naming at least t, x, y [s, m, m]; times must increase.
+
+    Raises:
+        ScenarioError: names the file, the line and what is allowed.
+    """
+    times, points = [], []
+    try:
+        with open(path, newline="") as file:
+            table = csv.DictReader(file)
+            missing = [name for name in "txy" if name not in (table.fieldnames or ())]
+            if missing:
+                raise ScenarioError(
+                    f"{path}: column {missing[0]!r} is missing: the header must name t, x, y; it is {table.fieldnames}"
+                )
+            for row in table:
+                try:
+                    t, x, y = (float(row[name]) for name in "txy")
+                except (TypeError, ValueError):
+                    raise ScenarioError(f"{path}, line {table.line_num}: {row} must be numbers t, x, y") from None
+                if not np.isfinite((t, x, y)).all():
+                    raise ScenarioError(f"{path}, line {table.line_num}: t={t}, x={x}, y={y} must be finite")
+                if times and t <= times[-1]:
+                    raise ScenarioError(f"{path}, line {table.line_num}: t={t} must be later than {times[-1]}")
+                times.append(t)
+                points.append((x, y))
+    except (OSError, UnicodeDecodeError) as problem:
+        raise ScenarioError(f"track {path!r} cannot be read: {problem}") from None
+    if len(times) < 2:
+        raise ScenarioError(f"{path}: has {len(times)} points: at least 2 are needed")
+    return _resampled(path, np.array(times), np.array(points), scenario)
+
+
+def _resampled(path, times, points, scenario: Scenario) -> np.ndarray:
+    side, span = scenario.field.side_m, scenario.motion.span_m
+    if span is not None:
+        low, high = points.min(axis=0), points.max(axis=0)
+        extent = (high - low).max()
+        if extent == 0:
+            raise ScenarioError(f"{path}: the target does not move: cannot scale to span_m = {span}")
+        points = side / 2 + (points - (low + high) / 2) * min(span, side) / extent
+    elif points.min() < 0 or points.max() > side:
+        raise ScenarioError(
+            f"{path}: spans {points.min()}..{points.max()} m: must lie in the field 0..{side} m, or give span_m"
+        )
+    at = np.linspace(times[0], times[-1], scenario.periods + 1)
+    track = np.empty((scenario.periods + 1, 4))
+    for axis in (0, 1):
+        track[:, 2 * axis] = np.interp(at, times, points[:, axis])
+        track[:, 2 * axis + 1] = np.gradient(track[:, 2 * axis], scenario.period_s)
+    return track

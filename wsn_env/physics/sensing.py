@@ -1,0 +1,126 @@
+"""Detection and measurement.
+
+The likelihood of a measurement over a particle cloud stands with the filter, in trackers/kernels.
+"""
+
+import numpy as np
+
+from wsn_env import draws
+from wsn_env.compiling import kernel, piece
+from wsn_env.numerics import exp, log
+from wsn_env.physics.constants import CONSTANTS
+from wsn_env.physics.field import squared_distance
+from wsn_env.scenario import Detection
+
+
+@piece
+def detection_piece(distance, c):
+    """Eqs. 2-3 for one distance [m] and a record of constants."""
+    if distance <= c.inner_m:
+        return c.ceiling
+    if distance >= c.reach_m:
+        return 0.0
+    a1 = distance - c.inner_m
+    a2 = c.reach_m - distance
+    return c.ceiling * exp(-c.decay * exp(c.decay_power * log(a1) - c.edge_power * log(a2)))
+
+
+@kernel
+def _detection_probabilities(constants, distances, out):
+    c = constants[0]
+    for i in range(len(distances)):
+        out[i] = detection_piece(distances[i], c)
+
+
+def detection_probability(distance, detection: Detection):
+    """Probability that a node detects the target.
+
+        p(d) = l2                                    d <= (1 - delta) r
+               l2 exp(-l1 a1**b1 / a2**b2)           in between
+               0                                     d >= (1 + delta) r
+
+    with a1 = d - (1 - delta) r and a2 = (1 + delta) r - d. Xiang & Guo (2013), eqs. 2-3.
+
+    Args:
+        distance: (...,) m, target to node.
+        detection: radius_m (r), softness (delta), decay (l1), ceiling (l2), decay_power (b1), edge_power (b2).
+
+    Returns: (...,) probability in [0, ceiling].
+    """
+    record = np.zeros(1, CONSTANTS)
+    record["inner_m"] = (1 - detection.softness) * detection.radius_m
+    record["reach_m"] = detection.reach_m
+    for name in ("decay", "ceiling", "decay_power", "edge_power"):
+        record[name] = getattr(detection, name)
+    distance = np.asarray(distance, dtype=float)
+    out = np.empty(distance.size)
+    _detection_probabilities(record, np.ascontiguousarray(distance).ravel(), out)
+    return out.reshape(distance.shape)
+
+
+def joint_detection_probability(probabilities):
+    """Probability that at least one of the nodes detects: 1 - prod(1 - p_i). Xiang & Guo (2013), eq. 4.
+
+    Args:
+        probabilities: (..., n); nodes that do not take part have 0.
+
+    Returns: (...,), the same bits for every batch (the product runs in the order of the nodes).
+    """
+    missed = np.cumprod(1.0 - np.asarray(probabilities, dtype=float), axis=-1)
+    return 1.0 - missed[..., -1]
+
+
+@piece
+def detects(key, period, node, distance, c):
+    """Whether a node, if awake, detects the target in this period."""
+    p = detection_piece(distance, c)
+    return p > 0.0 and draws.uniform(draws.stream(key, period, draws.DETECTION), node) < p
+
+
+@piece
+def strength(squared, c):
+    """Noise-free strength at a squared distance [m^2], in dB or in power."""
+    fall = c.slope * log(max(squared, c.floor_m * c.floor_m, 1e-12))
+    return c.level - fall if c.model == 1 else c.level * exp(-fall)
+
+
+@piece
+def measure(key, period, node, positions, target, c, value):
+    """What node `node` measures if it detects: `value` (2,) = x, y [m] (eq. 7), or strength and 0 (eq. 1)."""
+    e0, e1 = draws.normal_pair(draws.stream(key, period, draws.MEASUREMENT), node)
+    if c.model == 0:
+        value[0] = target[0] + c.noise * e0
+        value[1] = target[2] + c.noise * e1
+    else:
+        value[0] = strength(squared_distance(positions, node, target[0], target[2]), c) + c.noise * e0
+        value[1] = 0.0
+
+
+@piece
+def log_miss_probability(mean, cov, positions, nodes, count, head, c):
+    """Log of the probability that none of the awake nodes would have been heard, averaged over the belief.
+
+    The average is Gauss and Hermite's with 3 x 3 points over the belief's position (exact to degree 5).
+
+    Args:
+        mean, cov: (4,), (4, 4) the belief about this period before its reports.
+        nodes, count: the members, whose reports may be lost on the way.
+        head: -1: nobody is awake; its own report is always heard.
+    """
+    a = np.sqrt(max(cov[0, 0], 1e-12))
+    b = cov[0, 2] / a
+    d = np.sqrt(max(cov[2, 2] - b * b, 0.0))
+    total = 0.0
+    for i in range(-1, 2):
+        for j in range(-1, 2):
+            weight = (2.0 / 3.0 if i == 0 else 1.0 / 6.0) * (2.0 / 3.0 if j == 0 else 1.0 / 6.0)
+            u, v = 1.7320508075688772 * i, 1.7320508075688772 * j
+            x, y = mean[0] + a * u, mean[2] + b * u + d * v
+            missed = 1.0
+            if head >= 0:
+                missed = 1.0 - detection_piece(np.sqrt(squared_distance(positions, head, x, y)), c)
+            for k in range(count):
+                distance = np.sqrt(squared_distance(positions, nodes[k], x, y))
+                missed *= 1.0 - c.delivery * detection_piece(distance, c)
+            total += weight * missed
+    return log(max(total, 1e-300))

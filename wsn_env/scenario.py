@@ -1,0 +1,411 @@
+"""A scenario says everything about a simulated network and its target: frozen sections of quantities with units.
+
+Every default is system A's (Xiang & Guo, 2013, Table 1) unless its meaning says otherwise. Quantities that
+follow from others are properties, never fields.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+
+class ScenarioError(ValueError):
+    """A quantity is not what it may be; the message names it, its value and what is allowed."""
+
+
+def quantity(default, meaning, *, above=None, at_least=None, at_most=None, whole=False, choices=None, optional=False):
+    """A field with its meaning (shown by --help) and what is allowed."""
+    allowed = dict(
+        above=above, at_least=at_least, at_most=at_most, whole=whole, choices=choices, optional=optional
+    )
+    return field(default=default, metadata={"meaning": meaning, "allowed": allowed})
+
+
+def check_quantity(owner: str, name: str, value: Any, allowed: dict) -> None:
+    """Raise ScenarioError unless `value` is allowed for the field `name` of `owner`."""
+    if value is None and allowed["optional"]:
+        return
+    if allowed["choices"] is not None:
+        if value not in allowed["choices"]:
+            raise ScenarioError(f"{owner}.{name} = {value!r}: allowed are {', '.join(map(str, allowed['choices']))}")
+        return
+    kind = "a whole number" if allowed["whole"] else "a finite number"
+    rules = [
+        f"{words} {allowed[rule]}"
+        for rule, words in (("above", "above"), ("at_least", "at least"), ("at_most", "at most"))
+        if allowed[rule] is not None
+    ]
+    numeric = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    good = (
+        numeric
+        and math.isfinite(value)
+        and (not allowed["whole"] or value == int(value))
+        and (allowed["above"] is None or value > allowed["above"])
+        and (allowed["at_least"] is None or value >= allowed["at_least"])
+        and (allowed["at_most"] is None or value <= allowed["at_most"])
+    )
+    if not good:
+        raise ScenarioError(f"{owner}.{name} = {value!r}: must be {' '.join([kind, ' and '.join(rules)]).strip()}")
+
+
+@dataclass(frozen=True)
+class Section:
+    """Base of all sections: checks every quantity when it is made."""
+
+    def __post_init__(self):
+        for item in fields(self):
+            if "allowed" in item.metadata:
+                check_quantity(type(self).__name__, item.name, getattr(self, item.name), item.metadata["allowed"])
+
+
+@dataclass(frozen=True)
+class Field(Section):
+    """Where the nodes stand: uniformly at random in a square, anew in every episode unless fixed."""
+
+    nodes: int = quantity(225, "number of sensor nodes S", at_least=1, whole=True)
+    side_m: float = quantity(100.0, "side of the square field", above=0)
+    field_seed: int | None = quantity(
+        None, "one fixed field drawn from this seed; None: a new one each episode", at_least=0, whole=True, optional=True
+    )
+    positions: tuple[tuple[float, float], ...] | None = None  # m; given nodes instead of drawn ones
+
+    def __post_init__(self):
+        if self.positions is not None:
+            array = np.asarray(self.positions, dtype=float)
+            if array.ndim != 2 or array.shape[1] != 2 or not len(array) or not np.isfinite(array).all():
+                raise ScenarioError(f"Field.positions has shape {array.shape}: must be finite pairs (x, y) in m")
+            if array.min() < 0 or array.max() > self.side_m:
+                raise ScenarioError(f"Field.positions spans {array.min()}..{array.max()}: must lie in 0..{self.side_m} m")
+            object.__setattr__(self, "positions", tuple(map(tuple, array.tolist())))
+            object.__setattr__(self, "nodes", len(array))
+        super().__post_init__()
+
+
+# --- how the target moves -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Motion(Section):
+    """Base of all motions. `fitting_q` is the filter's process noise that suits the track [m/s^2]."""
+
+    fitting_q: ClassVar[float]
+
+
+@dataclass(frozen=True)
+class Crossing(Motion):
+    """Straight between two uniform points of the inner field, in the horizon's time (the training default)."""
+
+    fitting_q: ClassVar[float] = 0.05
+    margin_m: float = quantity(10.0, "end points keep this distance from the border", at_least=0)
+    crossing_m: float = quantity(40.0, "least distance between the end points", above=0)
+    acceleration_ms2: float = quantity(0.025, "sd of the white acceleration on the track (q/2)", at_least=0)
+
+
+@dataclass(frozen=True)
+class Straight(Motion):
+    """The diagonal of the reproduction: from a point at a constant velocity, without noise."""
+
+    fitting_q: ClassVar[float] = 0.02
+    from_m: float = quantity(5.0, "start, both axes", at_least=0)
+    velocity_ms: float = quantity(0.9, "velocity, both axes")
+
+
+@dataclass(frozen=True)
+class Sine(Motion):
+    """One full wave across the field: x advances at a constant speed, y swings about the middle."""
+
+    fitting_q: ClassVar[float] = 0.2
+    speed_ms: float = quantity(0.9, "speed along x", above=0)
+    amplitude_m: float = quantity(25.0, "swing along y", at_least=0)
+    turn_s: float = quantity(100.0, "time of one wave", above=0)
+
+
+@dataclass(frozen=True)
+class Circle(Motion):
+    """Round the middle of the field at a constant speed (1.9 m/s by default)."""
+
+    fitting_q: ClassVar[float] = 0.2
+    circle_m: float = quantity(30.0, "radius", above=0)
+    turn_s: float = quantity(100.0, "time of one round", above=0)
+
+
+@dataclass(frozen=True)
+class Turns(Motion):
+    """Random turns: constant speed, now and then a new heading within a quarter turn; reflected at the border."""
+
+    fitting_q: ClassVar[float] = 0.2
+    speed_ms: float = quantity(1.0, "speed", above=0)
+    turn_probability: float = quantity(0.1, "probability of a turn in a period", at_least=0, at_most=1)
+
+
+@dataclass(frozen=True)
+class Waypoint(Motion):
+    """Random waypoint: straight at a constant speed to a uniform point of the field, then to the next."""
+
+    fitting_q: ClassVar[float] = 0.2
+    speed_ms: float = quantity(1.0, "speed", above=0)
+
+
+@dataclass(frozen=True)
+class Recorded(Motion):
+    """Recorded tracks from CSV files with columns t, x, y [s, m, m]; an episode picks one by its key.
+
+    Each is resampled linearly to the horizon's periods; with `span_m` it is scaled so that the longer side of its
+    bounding box has this length, and centred onto the field.
+    """
+
+    fitting_q: ClassVar[float] = 0.2
+    tracks: tuple[str, ...] = ()
+    span_m: float | None = quantity(80.0, "scale to this extent and centre; None: as recorded", above=0, optional=True)
+
+    def __post_init__(self):
+        names = (self.tracks,) if isinstance(self.tracks, (str, Path)) else self.tracks
+        object.__setattr__(self, "tracks", tuple(str(name) for name in names))
+        if not self.tracks:
+            raise ScenarioError("Recorded.tracks = (): must name at least one CSV file with columns t, x, y")
+        super().__post_init__()
+
+
+MOTIONS = {
+    "crossing": Crossing,
+    "straight": Straight,
+    "sine": Sine,
+    "circle": Circle,
+    "turns": Turns,
+    "waypoint": Waypoint,
+    "recorded": Recorded,
+}
+
+
+# --- what nodes sense ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Detection(Section):
+    """Probability of detection against distance (eqs. 2-3)."""
+
+    radius_m: float = quantity(10.0, "sensing radius r_s", above=0)
+    softness: float = quantity(0.2, "delta: half width of the soft edge, in radii", above=0, at_most=1)
+    decay: float = quantity(1.0, "lambda1", at_least=0)
+    ceiling: float = quantity(0.6, "lambda2: probability well inside the radius", above=0, at_most=1)
+    decay_power: float = quantity(3.0, "beta1", above=0)
+    edge_power: float = quantity(2.0, "beta2", above=0)
+
+    @property
+    def reach_m(self) -> float:
+        """From here on a node detects nothing."""
+        return (1 + self.softness) * self.radius_m
+
+
+@dataclass(frozen=True)
+class Measurement(Section):
+    """Base of what a detecting node measures."""
+
+    code: ClassVar[int]
+
+
+@dataclass(frozen=True)
+class Position(Measurement):
+    """Its own noisy position of the target (eq. 7)."""
+
+    code: ClassVar[int] = 0
+    noise_m: float = quantity(2.0, "sd of each coordinate", above=0)
+
+
+@dataclass(frozen=True)
+class Rssi(Measurement):
+    """Received strength in dB: reference - 10 n log10(max(d, floor)) + noise (eq. 1 in its log-distance form)."""
+
+    code: ClassVar[int] = 1
+    reference_dbm: float = quantity(-40.0, "level at 1 m")
+    exponent: float = quantity(2.5, "path loss exponent n", above=0)
+    noise_db: float = quantity(3.0, "sd", above=0)
+    floor_m: float = quantity(1.0, "nearer than this the level grows no more", above=0)
+
+
+@dataclass(frozen=True)
+class RssiPower(Measurement):
+    """Received power: a max(d, floor)^-beta + noise (eq. 1 as printed, 2 <= beta <= 4)."""
+
+    code: ClassVar[int] = 2
+    amplitude: float = quantity(100.0, "power a at 1 m, in any unit", above=0)
+    exponent: float = quantity(2.0, "beta", at_least=2, at_most=4)
+    noise: float = quantity(0.2, "sd, in the same unit", above=0)
+    floor_m: float = quantity(1.0, "nearer than this the power grows no more", above=0)
+
+
+MEASUREMENTS = {"position": Position, "rssi": Rssi, "rssi_power": RssiPower}
+
+
+# --- what talking costs ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Radio(Section):
+    """Energy per bit (eq. 5), packet sizes, loss, batteries."""
+
+    tx_nj_per_bit: float = quantity(50.0, "e1: sending, whatever the distance", at_least=0)
+    amplifier_pj_per_bit_m2: float = quantity(150.0, "e2: sending, times distance squared", at_least=0)
+    rx_nj_per_bit: float = quantity(100.0, "e_r: receiving", at_least=0)
+    report_bits: int = quantity(512, "a member's report", at_least=0, whole=True)
+    invitation_bits: int = quantity(128, "an invitation to a new member", at_least=0, whole=True)
+    handover_bits: int = quantity(448, "the estimate, from old to new head", at_least=0, whole=True)
+    wakeup_bits: int = quantity(128, "the wake-up of a search, paid by its receivers", at_least=0, whole=True)
+    broadcast_bits: int = quantity(32, "the head's word to resample", at_least=0, whole=True)
+    handover: str = quantity(
+        "estimate", "what is handed over: the estimate (handover_bits) or every particle", choices=("estimate", "particles")
+    )
+    packet_success: float = quantity(1.0, "probability that one try of a report arrives", at_least=0, at_most=1)
+    retries: int = quantity(3, "further tries of a lost report", at_least=0, at_most=15, whole=True)
+    sensing_nj: float = quantity(0.0, "energy of an awake node's sensing, per period", at_least=0)
+    battery_j: float = quantity(1.0, "a node's energy at the start", above=0)
+
+    @property
+    def delivery(self) -> float:
+        """Probability that a report arrives within all its tries."""
+        return 1 - (1 - self.packet_success) ** (1 + self.retries)
+
+
+# --- how the target is tracked -----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Tracking(Section):
+    """The filter at the head, and the search rule for lost tracks."""
+
+    tracker: str = quantity("particle", "particle | ekf | snapshot", choices=("particle", "ekf", "snapshot"))
+    particles: int = quantity(5000, "number of particles P", at_least=2, at_most=1_000_000, whole=True)
+    fusion: str = quantity("joint", "joint (members send z) or pooled (eqs. 9-15)", choices=("joint", "pooled"))
+    resample_below: float = quantity(2 / 3, "resample at N_eff below this share of P (eq. 14)", at_least=0, at_most=1)
+    filter_q: float | None = quantity(
+        None, "sd of the filter's acceleration noise [m/s^2]; None: what suits the motion", at_least=0, optional=True
+    )
+    start: str = quantity("known", "known: mean ~ N(truth, P0); search: from a search", choices=("known", "search"))
+    start_sd_m: float = quantity(1.0, "position sd of P0", above=0)
+    start_sd_ms: float = quantity(0.1, "velocity sd of P0", above=0)
+    search: bool = True  # search for lost tracks
+    search_miss: float = quantity(1e-3, "search when missing so long was less probable", above=0, at_most=1)
+    search_gap: int = quantity(5, "periods between searches, at least", at_least=1, whole=True)
+
+
+@dataclass(frozen=True)
+class Scenario(Section):
+    """Everything about a simulated network. `Scenario.named(id)` gives a published system's."""
+
+    name: str = "PreDC-v0"
+    periods: int = quantity(100, "horizon of an episode", at_least=1, whole=True)
+    period_s: float = quantity(1.0, "sampling period T", above=0)
+    lam: float | tuple[float, float] = 4.0  # m/mJ; a pair (low, high): drawn log-uniformly for each episode
+    field: Field = Field()
+    motion: Motion = Crossing()
+    detection: Detection = Detection()
+    measurement: Measurement = Position()
+    radio: Radio = Radio()
+    tracking: Tracking = Tracking()
+
+    def __post_init__(self):
+        super().__post_init__()
+        low, high = self.lam_range
+        if not (np.isfinite([low, high]).all() and 0 <= low <= high) or (low == 0) != (high == 0):
+            raise ScenarioError(f"Scenario.lam = {self.lam!r}: must be at least 0 m/mJ, or a pair 0 < low <= high")
+
+    @property
+    def lam_range(self) -> tuple[float, float]:
+        """(lowest, highest) lam of an episode [m/mJ]."""
+        try:
+            low, high = self.lam if isinstance(self.lam, (tuple, list)) else (self.lam, self.lam)
+            return float(low), float(high)
+        except (TypeError, ValueError):
+            raise ScenarioError(f"Scenario.lam = {self.lam!r}: must be a number of m/mJ or a pair of them") from None
+
+    @property
+    def filter_q(self) -> float:
+        """The filter's acceleration noise [m/s^2]."""
+        return self.motion.fitting_q if self.tracking.filter_q is None else self.tracking.filter_q
+
+    @property
+    def handover_bits(self) -> int:
+        """Size of a handover: the estimate, or 5 numbers of 32 bits for every particle."""
+        return self.radio.handover_bits if self.radio.handover == "estimate" else 5 * 32 * self.tracking.particles
+
+    @classmethod
+    def named(cls, name: str, **overrides) -> Scenario:
+        """A preset, with overrides by quantity.
+
+        Args:
+            name: "PreDC-v0" or "Rssi-v0", with or without "wsn_env/".
+            overrides: as for `override`.
+        """
+        short = name.removeprefix("wsn_env/")
+        if short not in PRESETS:
+            raise ScenarioError(f"scenario {name!r} is unknown: {suggest(short, PRESETS)}")
+        return PRESETS[short].override(**overrides)
+
+    def override(self, **changes) -> Scenario:
+        """A copy with some quantities changed, whatever section they stand in.
+
+        Sections are given whole or, for motion and measurement, by name: `override(nodes=400, motion="sine",
+        amplitude_m=20, tracker="ekf")`. An unknown keyword raises and suggests.
+        """
+        changes = {name: value for name, value in changes.items()}
+        whole = {}
+        for name, kinds in (("motion", MOTIONS), ("measurement", MEASUREMENTS)):
+            if isinstance(changes.get(name), str):
+                chosen = changes.pop(name)
+                if chosen not in kinds:
+                    raise ScenarioError(f"Scenario.{name} = {chosen!r}: {suggest(chosen, kinds)}")
+                own = {item.name for item in fields(kinds[chosen])}
+                whole[name] = kinds[chosen](**{key: changes.pop(key) for key in own & changes.keys()})
+        for item in fields(self):
+            if item.name in changes:
+                whole[item.name] = changes.pop(item.name)
+        scenario = replace(self, **whole)
+        for item in fields(scenario):
+            section = getattr(scenario, item.name)
+            if is_dataclass(section):
+                own = {part.name for part in fields(section)} & changes.keys()
+                if own:
+                    new = replace(section, **{key: changes.pop(key) for key in own})
+                    scenario = replace(scenario, **{item.name: new})
+        if changes:
+            name = next(iter(changes))
+            raise ScenarioError(f"scenario has no quantity {name!r}: {suggest(name, scenario.quantities())}")
+        return scenario
+
+    def quantities(self) -> dict[str, Any]:
+        """Every quantity of every section by name."""
+        flat = {}
+        for item in fields(self):
+            value = getattr(self, item.name)
+            flat |= {f.name: getattr(value, f.name) for f in fields(value)} if is_dataclass(value) else {item.name: value}
+        return flat
+
+    def as_dict(self) -> dict[str, Any]:
+        """Nested plain values for JSON, with the chosen kind of motion and measurement."""
+        plain: dict[str, Any] = {}
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if is_dataclass(value):
+                plain[item.name] = {"kind": type(value).__name__} | {f.name: getattr(value, f.name) for f in fields(value)}
+            else:
+                plain[item.name] = value
+        return plain
+
+
+def suggest(name: str, known) -> str:
+    """What to write instead of an unknown name."""
+    known = sorted(map(str, known))
+    near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
+    return f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(known)}"
+
+
+PRESETS = {
+    "PreDC-v0": Scenario(name="PreDC-v0"),
+    "Rssi-v0": Scenario(name="Rssi-v0", measurement=Rssi()),
+}

@@ -1,0 +1,52 @@
+"""The cluster particle filter (Xiang & Guo, 2013, eqs. 9-15); its arithmetic stands in `kernels`."""
+
+import numpy as np
+
+from wsn_env.compiling import over_rows
+from wsn_env.physics.constants import constants
+from wsn_env.scenario import Scenario
+from wsn_env.trackers import kernels
+from wsn_env.types import Belief, Network, Reports
+
+
+class ParticleTracker:
+    """A bootstrap filter with systematic resampling at N_eff < 2P/3.
+
+    Fusion "joint": members send z and every particle is weighed with the product of the likelihoods. "pooled" (the
+    paper): particle i is weighed by member i mod m only, and the head pools the members' sums. A period without
+    reports only predicts.
+    """
+
+    def __init__(self, scenario: Scenario, threads: int = 1):
+        self.particles = scenario.tracking.particles
+        self.threads = threads
+        self._constants = constants(scenario)
+
+    def start(self, keys, periods, rows, belief: Belief) -> None:
+        """Draw the clouds of the marked rows from N(mean, cov), in place."""
+        over_rows(kernels.spread_rows, len(keys), self.threads, keys, periods, rows, belief)
+
+    def relocate(self, keys, periods, rows, belief: Belief) -> None:
+        """Draw the positions of the marked rows' particles from N(mean, cov), in place; keep the velocities."""
+        over_rows(kernels.relocate_rows, len(keys), self.threads, keys, periods, rows, belief)
+
+    def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
+        """Predict, weigh, read mean and covariance, resample, in place."""
+        over_rows(
+            kernels.filter_rows,
+            len(keys),
+            self.threads,
+            self._constants,
+            keys,
+            periods,
+            belief,
+            network.positions,
+            reports,
+            resampled,
+        )
+
+
+def weighted_cloud(belief: Belief, row: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Particles (P, 4) and normalised weights (P,) of a row, for pictures and tests."""
+    weights = np.exp(belief.log_weights[row].astype(float))
+    return belief.particles[row].T.astype(float), weights / weights.sum()

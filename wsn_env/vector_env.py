@@ -1,0 +1,196 @@
+"""The native vector environment: a World with B rows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+
+from wsn_env import draws
+from wsn_env.env import check_render_mode, measures, resolve
+from wsn_env.interface import Interface, Settings
+from wsn_env.interface.render import frame
+from wsn_env.scenario import Scenario
+from wsn_env.types import State
+from wsn_env.view import View
+from wsn_env.world import World
+
+
+class ClusterVectorEnv(gym.vector.VectorEnv):
+    """B fields at once. Row i is bit-identical to a ClusterEnv with seed + i, in all three autoreset modes.
+
+    Args:
+        num_envs: B.
+        autoreset_mode: "NextStep" (Gymnasium's default), "SameStep", or "Disabled": then rows are started anew by
+            `reset(options={"reset_mask": (B,) bool})`.
+        threads: cores to share a large batch; None: all that the process may use. No bit depends on it.
+        The rest: as ClusterEnv.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 10, "autoreset_mode": AutoresetMode.NEXT_STEP}
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        scenario: str | Scenario = "PreDC-v0",
+        action: str = "menu",
+        observation: str = "candidates",
+        reward: str = "error",
+        order: str = "nearest",
+        candidates: int = Settings.candidates,
+        render_mode: str | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        threads: int | None = None,
+        **overrides,
+    ):
+        check_render_mode(render_mode, self.metadata)
+        if not isinstance(num_envs, int) or num_envs < 1:
+            raise ValueError(f"num_envs = {num_envs!r}: must be a whole number, at least 1")
+        self.num_envs = num_envs
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = type(self).metadata | {"autoreset_mode": self.autoreset_mode}
+        self.render_mode = render_mode
+        self.scenario = resolve(scenario, overrides)
+        self.interface = Interface(self.scenario, Settings(action, observation, reward, order, candidates))
+        self.world = World(self.scenario, threads)
+        self.single_action_space = self.interface.action.space
+        self.single_observation_space = self.interface.observation.space
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._generators: list[np.random.Generator | None] = [None] * num_envs
+        self._state: State | None = None
+        self._view: View | None = None
+        self._squares = np.zeros(num_envs)
+        self._ended = np.zeros(num_envs, dtype=bool)
+
+    def reset(self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None):
+        """New episodes, in the rows of options["reset_mask"] only where it is given.
+
+        Args:
+            seed: an int seeds row i with seed + i; a list seeds each row, None leaves its generator going.
+        """
+        rows = self._rows_to_reset(options)
+        seeds = [None if seed is None else seed + i for i in range(self.num_envs)] if not isinstance(seed, list) else seed
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"seed has {len(seeds)} entries: must have one for each of the {self.num_envs} rows")
+        for i in np.flatnonzero(rows):
+            if seeds[i] is not None or self._generators[i] is None:
+                self._generators[i] = seeding.np_random(seeds[i])[0]
+        if self._state is None:
+            self._state = self.world.reset(np.zeros(self.num_envs, np.uint64))
+        outcome = self._restart(rows)
+        info = measures(outcome, self._state, -outcome.error_m)
+        return self._observe(), _masked(info, rows)
+
+    def _rows_to_reset(self, options) -> np.ndarray:
+        mask = (options or {}).get("reset_mask")
+        if mask is None:
+            return np.ones(self.num_envs, dtype=bool)
+        good = isinstance(mask, np.ndarray) and mask.shape == (self.num_envs,) and mask.dtype == bool and mask.any()
+        if not good or (self._state is None and not mask.all()):
+            raise ValueError(
+                f"options['reset_mask'] = {mask!r}: must be a NumPy bool array of shape ({self.num_envs},) with at least"
+                " one True, after a reset of all rows"
+            )
+        return mask
+
+    def _restart(self, rows: np.ndarray):
+        keys = np.zeros(self.num_envs, np.uint64)
+        for i in np.flatnonzero(rows):
+            keys[i] = draws.episode_key(self._generators[i])
+        self._state, outcome = self.world.restart(self._state, rows, keys, donate=True)
+        self._squares[rows] = 0.0
+        self._ended[rows] = False
+        return outcome
+
+    def step(self, actions):
+        """One period for every row; ended rows start anew as the autoreset mode says."""
+        if self._state is None:
+            raise gym.error.ResetNeeded("call reset() before step()")
+        anew = self._ended.copy()
+        if anew.any() and self.autoreset_mode == AutoresetMode.DISABLED:
+            raise gym.error.ResetNeeded(
+                f"rows {np.flatnonzero(anew).tolist()} have ended: reset them with options={{'reset_mask': ...}}"
+            )
+        cluster = self.interface.action.cluster(self._checked(actions), self._view)
+        self._state, outcome = self.world.step(self._state, cluster, donate=True)
+        reward = self.interface.reward(outcome, self._state.lam)
+        info = measures(outcome, self._state, reward)
+        self._squares += outcome.error_m**2
+        if anew.any():  # next-step mode: these rows only begin
+            reward[anew] = 0.0
+            first = self._restart(anew)
+            _overwrite(info, measures(first, self._state, -first.error_m), anew)
+        truncated = self._state.period >= self.scenario.periods
+        terminated = np.zeros(self.num_envs, dtype=bool)
+        ends = {"episode_rms_m": np.sqrt(self._squares / self.scenario.periods)}
+        if self.autoreset_mode == AutoresetMode.SAME_STEP and truncated.any():
+            return self._same_step(reward, terminated, truncated, info, ends)
+        self._ended = truncated.copy()
+        infos = _masked(info, np.ones(self.num_envs, dtype=bool))
+        if truncated.any():
+            infos |= _masked(ends, truncated)
+        return self._observe(), reward, terminated, truncated, infos
+
+    def _same_step(self, reward, terminated, truncated, info, ends):
+        """Begin the ended rows within the step; their last observation and info go to final_obs and final_info."""
+        last = self._observe()
+        final = np.full(self.num_envs, None, dtype=object)
+        for i in np.flatnonzero(truncated):
+            final[i] = {name: value[i] for name, value in last.items()} if isinstance(last, dict) else last[i]
+        infos = {"final_obs": final, "_final_obs": truncated.copy()}
+        infos |= {"final_info": _masked(info | ends, truncated), "_final_info": truncated.copy()}
+        first = self._restart(truncated)
+        _overwrite(info, measures(first, self._state, -first.error_m), truncated)
+        infos |= _masked(info, np.ones(self.num_envs, dtype=bool))
+        return self._observe(), reward, terminated, truncated, infos
+
+    def action_masks(self) -> np.ndarray:
+        """(B, n) bool: which entries of each row's action make sense now."""
+        return self.interface.action.masks(self._view)
+
+    def render(self):
+        """A tuple of B frames (H, W, 3) uint8."""
+        if self.render_mode is None or self._state is None:
+            gym.logger.warn("render() needs render_mode='rgb_array' and a reset environment")
+            return None
+        return tuple(frame(self._state, self.scenario, row) for row in range(self.num_envs))
+
+    def _checked(self, actions):
+        if isinstance(actions, dict):
+            actions = {name: np.asarray(value) for name, value in actions.items()}
+        elif not isinstance(actions, (list, tuple)) and getattr(actions, "dtype", None) != object:
+            actions = np.asarray(actions, dtype=self.action_space.dtype)
+        else:  # a sequence of single actions
+            single = list(actions)
+            if single and isinstance(single[0], dict):
+                actions = {name: np.stack([one[name] for one in single]) for name in single[0]}
+            else:
+                actions = np.asarray(single, dtype=self.action_space.dtype)
+        if not self.action_space.contains(actions):
+            raise ValueError(f"actions {actions!r} are not in {self.action_space}")
+        return actions
+
+    def _observe(self):
+        self._view = View.of(self._state)
+        return self.interface.observation.encode(self._view)
+
+
+def _masked(info: dict[str, np.ndarray], rows: np.ndarray) -> dict[str, np.ndarray]:
+    """Gymnasium's form of a vector info: zeros where a row has none, and a mask under "_name"."""
+    out = {}
+    for name, value in info.items():
+        value = value.copy()
+        value[~rows] = 0
+        out[name] = value
+        out[f"_{name}"] = rows.copy()
+    return out
+
+
+def _overwrite(info: dict[str, np.ndarray], other: dict[str, np.ndarray], rows: np.ndarray) -> None:
+    for name, value in other.items():
+        info[name][rows] = value[rows]

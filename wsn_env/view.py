@@ -1,0 +1,184 @@
+"""What policies and observations may see: belief, delivered reports, batteries, geometry, the standing cluster.
+
+Nothing here depends on the truth but through reports. A view shares its arrays with the state it was made from and is
+valid until that state is stepped with donate=True.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from wsn_env.physics import field as geometry
+from wsn_env.types import Cluster, Network, Reports, State
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """The network's knowledge before it chooses the cluster of the next period; all arrays lead with B."""
+
+    period: np.ndarray  # (B,) periods done
+    lam: np.ndarray  # (B,) m/mJ
+    luck: np.ndarray  # (B,) uint32: a random number of the period
+    log_miss: np.ndarray  # (B,) log probability of so long a silence
+    mean: np.ndarray  # (B, 4) x, vx, y, vy after the last correction
+    cov: np.ndarray  # (B, 4, 4)
+    predicted_mean: np.ndarray  # (B, 4) for the period to come
+    predicted_cov: np.ndarray  # (B, 4, 4)
+    network: Network
+    reports: Reports
+    _nearest: dict = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, state: State) -> View:
+        """The view of a state."""
+        belief = state.belief
+        return cls(
+            period=state.period,
+            lam=state.lam,
+            luck=state.luck,
+            log_miss=state.log_miss,
+            mean=belief.mean,
+            cov=belief.cov,
+            predicted_mean=belief.predicted_mean,
+            predicted_cov=belief.predicted_cov,
+            network=state.network,
+            reports=state.reports,
+        )
+
+    @property
+    def positions(self) -> np.ndarray:
+        """(B, S, 2) m."""
+        return self.network.positions
+
+    @property
+    def battery(self) -> np.ndarray:
+        """(B, S) J."""
+        return self.network.battery
+
+    @property
+    def head(self) -> np.ndarray:
+        """(B,) the standing head; -1: none."""
+        return self.network.head
+
+    @property
+    def rows(self) -> np.ndarray:
+        """(B,) 0, 1, ..., for indexing."""
+        return np.arange(len(self.period))
+
+    @cached_property
+    def alive(self) -> np.ndarray:
+        """(B, S) bool."""
+        return self.battery > 0
+
+    @cached_property
+    def member(self) -> np.ndarray:
+        """(B, S) bool: the standing cluster, head included."""
+        mask = _mask(self.network.members, self.network.n_members)
+        rows = np.flatnonzero(self.head >= 0)
+        mask[rows, self.head[rows]] = True
+        return mask
+
+    @cached_property
+    def detected(self) -> np.ndarray:
+        """(B, S) bool: whose reports the head had in the last period, its own included."""
+        return _mask(self.reports.node, self.reports.count)
+
+    @cached_property
+    def measured(self) -> np.ndarray:
+        """(B, S, 2): what they reported, zero elsewhere."""
+        values = np.zeros(self.positions.shape)
+        rows, slots = np.nonzero(np.arange(self.reports.node.shape[1]) < self.reports.count[:, None])
+        values[rows, self.reports.node[rows, slots]] = self.reports.value[rows, slots]
+        return values
+
+    @property
+    def prediction(self) -> np.ndarray:
+        """(B, 2) where the target should be in the period to come [m]."""
+        return self.predicted_mean[:, ::2]
+
+    @property
+    def spread_m(self) -> np.ndarray:
+        """(B,) E = max of the predicted position sds (eq. 16) [m]."""
+        return np.sqrt(np.maximum(self.predicted_cov[:, 0, 0], self.predicted_cov[:, 2, 2]))
+
+    @cached_property
+    def distance(self) -> np.ndarray:
+        """(B, S) of the nodes to the prediction [m]."""
+        return geometry.distances_to(self.positions, self.prediction)
+
+    def nearest(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """The living nodes nearest to the prediction: (B, count) nodes, -1 for none, and distances [m]."""
+        if count not in self._nearest:
+            self._nearest[count] = geometry.nearest(self.positions, self.battery, self.prediction, count)
+        return self._nearest[count]
+
+    def nearest_living(self) -> np.ndarray:
+        """(B,) the living node nearest to the prediction; -1: none is alive."""
+        return self.nearest(1)[0][:, 0]
+
+    def as_arrays(self) -> dict[str, np.ndarray]:
+        """Fresh arrays of fixed shape, the content of the observation "view"."""
+        return {
+            "period": self.period.astype(np.int64),
+            "lam": self.lam[:, None].copy(),
+            "luck": self.luck.astype(np.int64),
+            "log_miss": self.log_miss[:, None].copy(),
+            "mean": self.mean.copy(),
+            "cov": self.cov.copy(),
+            "predicted_mean": self.predicted_mean.copy(),
+            "predicted_cov": self.predicted_cov.copy(),
+            "positions": self.positions.copy(),
+            "battery": self.battery.copy(),
+            "head": self.head.copy(),
+            "member": self.member.astype(np.int8),
+            "detected": self.detected.astype(np.int8),
+            "measured": self.measured.copy(),
+        }
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, np.ndarray]) -> View:
+        """The view back from `as_arrays`; of one environment too, whose arrays lack the leading B."""
+        a = {name: np.asarray(value) for name, value in arrays.items()}
+        if a["battery"].ndim == 1:
+            a = {name: value[None] for name, value in a.items()}
+        rows = len(a["battery"])
+        heads = a["head"].reshape(rows).astype(np.int64)
+        others = a["member"].astype(bool)
+        standing = np.flatnonzero(heads >= 0)
+        others[standing, heads[standing]] = False
+        members, n_members = _lists(others)
+        node, count = _lists(a["detected"].astype(bool))
+        value = np.take_along_axis(a["measured"], np.maximum(node, 0)[:, :, None].astype(np.int64), axis=1)
+        return cls(
+            period=a["period"].reshape(rows),
+            lam=a["lam"].reshape(rows),
+            luck=a["luck"].reshape(rows).astype(np.uint32),
+            log_miss=a["log_miss"].reshape(rows),
+            mean=a["mean"],
+            cov=a["cov"],
+            predicted_mean=a["predicted_mean"],
+            predicted_cov=a["predicted_cov"],
+            network=Network(
+                a["positions"], a["battery"], (a["battery"] > 0).sum(axis=1), heads, members, n_members
+            ),
+            reports=Reports(count, node, value),
+        )
+
+
+def _mask(nodes: np.ndarray, count: np.ndarray) -> np.ndarray:
+    """(B, S) bool from the first `count` entries of (B, S) indices."""
+    mask = np.zeros(nodes.shape, dtype=bool)
+    rows, slots = np.nonzero(np.arange(nodes.shape[1]) < count[:, None])
+    mask[rows, nodes[rows, slots]] = True
+    return mask
+
+
+def _lists(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The inverse of `_mask`: indices (B, S) int32 and counts."""
+    nodes = np.zeros(mask.shape, dtype=np.int32)
+    found = Cluster.of(np.zeros(len(mask)), mask).members
+    nodes[:, : found.shape[1]] = np.maximum(found, 0)
+    return nodes, mask.sum(axis=1)
