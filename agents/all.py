@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agents.base import HandWritten
+from agents.base import ViewPolicy
 from wsn_env.types import Cluster
 from wsn_env.view import View
 
 
 @dataclass(frozen=True)
-class All(HandWritten):
+class All(ViewPolicy):
     """All living nodes; head: the nearest to the prediction."""
 
     def act(self, view: View) -> Cluster:

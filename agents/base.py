@@ -1,4 +1,4 @@
-"""What all hand-written policies share: a scenario, and stable-baselines3's predict()."""
+"""What all policies share: a scenario, and stable-baselines3's predict()."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from wsn_env.view import View
 
 
 @dataclass(frozen=True)
-class HandWritten:
-    """Base of the hand-written policies: final classes add their parameters as fields and `act`."""
+class ViewPolicy:
+    """Base of the policies: final classes add their parameters as fields and `act`."""
 
     scenario: Scenario = Scenario()
 

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agents.base import HandWritten
+from agents.base import ViewPolicy
 from wsn_env.physics.field import distances_to
 from wsn_env.types import Cluster
 from wsn_env.view import View
 
 
 @dataclass(frozen=True)
-class Centroid(HandWritten):
+class Centroid(ViewPolicy):
     """Head: the living node nearest to the centroid of the nodes that detected last; members: the living nodes within
     the sensing radius of it. No motion model.
 

@@ -7,13 +7,13 @@ from functools import partial
 
 import numpy as np
 
-from agents.base import HandWritten
+from agents.base import ViewPolicy
 from wsn_env.types import Cluster
 from wsn_env.view import View
 
 
 @dataclass(frozen=True)
-class Nearest(HandWritten):
+class Nearest(ViewPolicy):
     """The head and its n nearest further members: the living nodes nearest to the prediction.
 
     The head stays while the prediction is within `hysteresis_m` of it; then the node nearest to the prediction leads.

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agents.base import HandWritten
+from agents.base import ViewPolicy
 from wsn_env.physics.sensing import joint_detection_probability
 from wsn_env.types import Cluster
 from wsn_env.view import View
 
 
 @dataclass(frozen=True)
-class PreDC(HandWritten):
+class PreDC(ViewPolicy):
     """Keep the cluster while the prediction is sharp and the cluster would detect there; else form a new one.
 
     The new head is the living node nearest to the prediction that has the energy for a handover and one period; its

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agents.base import HandWritten
+from agents.base import ViewPolicy
 from wsn_env.draws import uniforms
 from wsn_env.types import Cluster
 from wsn_env.view import View
 
 
 @dataclass(frozen=True)
-class Random(HandWritten):
+class Random(ViewPolicy):
     """Among the living nodes that can detect at the prediction, each is a member with probability one half and any may
     be the head; the nearest living node leads where none can. Draws on the view's luck, so it is repeatable."""
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agents.base import HandWritten
+from agents.base import ViewPolicy
 from wsn_env.types import Cluster
 from wsn_env.view import View
 
 
 @dataclass(frozen=True)
-class StaticCluster(HandWritten):
+class StaticCluster(ViewPolicy):
     """All living nodes that can detect at the prediction; head: the nearest to it."""
 
     def act(self, view: View) -> Cluster:

@@ -36,7 +36,9 @@ class _PackageCache(FunctionCache):
     def __init__(self, function):
         super().__init__(function)
         self._cache_file = IndexDataCacheFile(
-            cache_path=self._cache_path, filename_base=self._impl.filename_base, source_stamp=_stamp()
+            cache_path=self._cache_path,
+            filename_base=self._impl.filename_base,
+            source_stamp=(self._impl.locator.get_source_stamp(), _stamp()),
         )
 
     def load_overload(self, sig, target_context):

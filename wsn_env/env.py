@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import gymnasium as gym
@@ -103,11 +104,11 @@ class ClusterEnv(gym.Env):
         cluster = self.interface.action.cluster(_batched(action), self._view)
         self._state, outcome = self.world.step(self._state, cluster, donate=True)
         reward = self.interface.reward(outcome, self._state.lam)
-        self._squares += float(outcome.error_m[0]) ** 2
+        self._squares += (outcome.error_m[0] * outcome.error_m[0]).item()
         truncated = bool(self._state.period[0] >= self.scenario.periods)
         info = _first(measures(outcome, self._state, reward))
         if truncated:
-            info["episode_rms_m"] = (self._squares / self.scenario.periods) ** 0.5
+            info["episode_rms_m"] = math.sqrt(self._squares / self.scenario.periods)
         return self._observe(), float(reward[0]), False, truncated, info
 
     def action_masks(self) -> np.ndarray:

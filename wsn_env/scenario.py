@@ -14,6 +14,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+NUMBERS = (int, float, np.integer, np.floating)
+
 
 class ScenarioError(ValueError):
     """A quantity is not what it may be; the message names it, its value and what is allowed."""
@@ -41,10 +43,10 @@ def check_quantity(owner: str, name: str, value: Any, allowed: dict) -> None:
         for rule, words in (("above", "above"), ("at_least", "at least"), ("at_most", "at most"))
         if allowed[rule] is not None
     ]
-    numeric = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    numeric = isinstance(value, NUMBERS) and not isinstance(value, bool)
     good = (
         numeric
-        and math.isfinite(value)
+        and abs(value) < math.inf
         and (not allowed["whole"] or value == int(value))
         and (allowed["above"] is None or value > allowed["above"])
         and (allowed["at_least"] is None or value >= allowed["at_least"])
@@ -61,7 +63,10 @@ class Section:
     def __post_init__(self):
         for item in fields(self):
             if "allowed" in item.metadata:
-                check_quantity(type(self).__name__, item.name, getattr(self, item.name), item.metadata["allowed"])
+                value, allowed = getattr(self, item.name), item.metadata["allowed"]
+                check_quantity(type(self).__name__, item.name, value, allowed)
+                if allowed["whole"] and value is not None:
+                    object.__setattr__(self, item.name, int(value))
 
 
 @dataclass(frozen=True)
@@ -69,22 +74,27 @@ class Field(Section):
     """Where the nodes stand: uniformly at random in a square, anew in every episode unless fixed."""
 
     nodes: int = quantity(225, "number of sensor nodes S", at_least=1, whole=True)
-    side_m: float = quantity(100.0, "side of the square field", above=0)
+    side_m: float = quantity(100.0, "side of the square field", above=0, at_most=100_000)
     field_seed: int | None = quantity(
         None, "one fixed field drawn from this seed; None: a new one each episode", at_least=0, whole=True, optional=True
     )
     positions: tuple[tuple[float, float], ...] | None = None  # m; given nodes instead of drawn ones
 
     def __post_init__(self):
+        super().__post_init__()
         if self.positions is not None:
-            array = np.asarray(self.positions, dtype=float)
+            try:
+                array = np.asarray(self.positions, dtype=float)
+            except (TypeError, ValueError):
+                raise ScenarioError(f"Field.positions = {self.positions!r}: must be finite pairs (x, y) in m") from None
             if array.ndim != 2 or array.shape[1] != 2 or not len(array) or not np.isfinite(array).all():
                 raise ScenarioError(f"Field.positions has shape {array.shape}: must be finite pairs (x, y) in m")
             if array.min() < 0 or array.max() > self.side_m:
                 raise ScenarioError(f"Field.positions spans {array.min()}..{array.max()}: must lie in 0..{self.side_m} m")
+            if self.nodes not in (type(self).nodes, len(array)):
+                raise ScenarioError(f"Field.nodes = {self.nodes}: must be {len(array)}, as many as there are positions")
             object.__setattr__(self, "positions", tuple(map(tuple, array.tolist())))
             object.__setattr__(self, "nodes", len(array))
-        super().__post_init__()
 
 
 # --- how the target moves -----------------------------------------------------------------------------------
@@ -284,14 +294,29 @@ class Tracking(Section):
     fusion: str = quantity("joint", "joint (members send z) or pooled (eqs. 9-15)", choices=("joint", "pooled"))
     resample_below: float = quantity(2 / 3, "resample at N_eff below this share of P (eq. 14)", at_least=0, at_most=1)
     filter_q: float | None = quantity(
-        None, "sd of the filter's acceleration noise [m/s^2]; None: what suits the motion", at_least=0, optional=True
+        None,
+        "sd of the filter's acceleration noise [m/s^2]; None: what suits the motion",
+        at_least=0,
+        at_most=1000,
+        optional=True,
     )
     start: str = quantity("known", "known: mean ~ N(truth, P0); search: from a search", choices=("known", "search"))
-    start_sd_m: float = quantity(1.0, "position sd of P0", above=0)
-    start_sd_ms: float = quantity(0.1, "velocity sd of P0", above=0)
-    search: bool = True  # search for lost tracks
+    start_sd_m: float = quantity(1.0, "position sd of P0", above=0, at_most=100_000)
+    start_sd_ms: float = quantity(0.1, "velocity sd of P0", above=0, at_most=1000)
+    search: bool = quantity(True, "search for lost tracks", choices=(True, False))
     search_miss: float = quantity(1e-3, "search when missing so long was less probable", above=0, at_most=1)
     search_gap: int = quantity(5, "periods between searches, at least", at_least=1, whole=True)
+
+
+KINDS = {
+    "name": (str,),
+    "field": (Field,),
+    "motion": tuple(MOTIONS.values()),
+    "detection": (Detection,),
+    "measurement": tuple(MEASUREMENTS.values()),
+    "radio": (Radio,),
+    "tracking": (Tracking,),
+}
 
 
 @dataclass(frozen=True)
@@ -300,7 +325,7 @@ class Scenario(Section):
 
     name: str = "PreDC-v0"
     periods: int = quantity(100, "horizon of an episode", at_least=1, whole=True)
-    period_s: float = quantity(1.0, "sampling period T", above=0)
+    period_s: float = quantity(1.0, "sampling period T", above=0, at_most=3600)
     lam: float | tuple[float, float] = 4.0  # m/mJ; a pair (low, high): drawn log-uniformly for each episode
     field: Field = Field()
     motion: Motion = Crossing()
@@ -311,6 +336,10 @@ class Scenario(Section):
 
     def __post_init__(self):
         super().__post_init__()
+        for name, kinds in KINDS.items():
+            value = getattr(self, name)
+            if not isinstance(value, kinds):
+                raise ScenarioError(f"Scenario.{name} = {value!r}: must be a {' or '.join(k.__name__ for k in kinds)}")
         low, high = self.lam_range
         if not (np.isfinite([low, high]).all() and 0 <= low <= high) or (low == 0) != (high == 0):
             raise ScenarioError(f"Scenario.lam = {self.lam!r}: must be at least 0 m/mJ, or a pair 0 < low <= high")
@@ -318,11 +347,10 @@ class Scenario(Section):
     @property
     def lam_range(self) -> tuple[float, float]:
         """(lowest, highest) lam of an episode [m/mJ]."""
-        try:
-            low, high = self.lam if isinstance(self.lam, (tuple, list)) else (self.lam, self.lam)
-            return float(low), float(high)
-        except (TypeError, ValueError):
-            raise ScenarioError(f"Scenario.lam = {self.lam!r}: must be a number of m/mJ or a pair of them") from None
+        pair = tuple(self.lam) if isinstance(self.lam, (tuple, list)) else (self.lam, self.lam)
+        if len(pair) != 2 or any(isinstance(x, bool) or not isinstance(x, NUMBERS) for x in pair):
+            raise ScenarioError(f"Scenario.lam = {self.lam!r}: must be a number of m/mJ or a pair of them")
+        return float(pair[0]), float(pair[1])
 
     @property
     def filter_q(self) -> float:

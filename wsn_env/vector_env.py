@@ -120,7 +120,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self._state, outcome = self.world.step(self._state, cluster, donate=True)
         reward = self.interface.reward(outcome, self._state.lam)
         info = measures(outcome, self._state, reward)
-        self._squares += outcome.error_m**2
+        self._squares += outcome.error_m * outcome.error_m
         if anew.any():  # next-step mode: these rows only begin
             reward[anew] = 0.0
             first = self._restart(anew)
@@ -148,6 +148,11 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         _overwrite(info, measures(first, self._state, -first.error_m), truncated)
         infos |= _masked(info, np.ones(self.num_envs, dtype=bool))
         return self._observe(), reward, terminated, truncated, infos
+
+    @property
+    def lam(self) -> np.ndarray:
+        """(B,) the present episodes' trade-offs [m/mJ]."""
+        return self._state.lam
 
     def action_masks(self) -> np.ndarray:
         """(B, n) bool: which entries of each row's action make sense now."""

@@ -56,10 +56,12 @@ class World:
 
         Returns: the state, and an outcome that holds the search of `start="search"` and zeros else.
         """
+        rows, keys = np.asarray(rows, dtype=bool), np.asarray(keys, dtype=np.uint64)
+        if not rows.shape == keys.shape == (state.rows,):
+            raise ValueError(f"rows {rows.shape} and keys {keys.shape}: must both be ({state.rows},)")
         state = state if donate else state.copy()
         outcome = empty_outcome(state)
-        rows = np.asarray(rows, dtype=bool)
-        self._over_rows(_begin, rows, np.asarray(keys, np.uint64), *self._motion, self._start, state)
+        self._over_rows(_begin, rows, keys, *self._motion, self._start, self._placed, state)
         self.tracker.start(state.key, state.period, rows, state.belief)
         if self.scenario.tracking.start == "search":
             self._search(state, rows.copy(), outcome)
@@ -81,9 +83,9 @@ class World:
         outcome = empty_outcome(state)
         rows = np.ones(state.rows, bool)
         resampled = np.zeros(state.rows, bool)
-        chosen = np.array(cluster.members, dtype=np.int32, order="C")
+        heads, chosen = _choice(cluster, state.rows)
 
-        self._over_rows(_sense_and_report, cluster.head, chosen, state, outcome)
+        self._over_rows(_sense_and_report, heads, chosen, state, outcome)
         self.tracker.correct(state.key, state.period, state.belief, state.network, state.reports, resampled)
         lost = np.empty(state.rows, bool)
         self._over_rows(_notice_loss, lost, state)
@@ -103,7 +105,7 @@ class World:
 
     @cached_property
     def _start(self) -> np.ndarray:
-        """What `_begin` needs beside constants: P0, battery, lam, a fixed field."""
+        """What `_begin` needs beside constants: P0, battery, lam, the seed of a fixed field."""
         s = self.scenario
         known = s.tracking.start == "known"
         record = np.zeros(
@@ -117,8 +119,6 @@ class World:
                 ("high", "f8"),
                 ("seeded", "i8"),
                 ("field_key", "u8"),
-                ("placed", "i8"),
-                ("positions", "f8", (s.field.nodes, 2)),
             ],
         )
         record["known"] = known
@@ -126,13 +126,24 @@ class World:
         record["sd_ms"] = s.tracking.start_sd_ms if known else 1.0
         record["battery"] = s.radio.battery_j
         record["low"], record["high"] = s.lam_range
-        if s.field.positions is not None:
-            record["placed"] = 1
-            record["positions"] = s.field.positions
-        elif s.field.field_seed is not None:
+        if s.field.field_seed is not None:
             record["seeded"] = 1
             record["field_key"] = draws.key_of_seed(s.field.field_seed)
         return record
+
+    @cached_property
+    def _placed(self) -> np.ndarray:
+        """The given nodes (S, 2); (0, 2) where they are drawn. An array of its own: a record's type holds its shape."""
+        positions = self.scenario.field.positions
+        return np.empty((0, 2)) if positions is None else np.array(positions)
+
+
+def _choice(cluster: Cluster, rows: int) -> tuple[np.ndarray, np.ndarray]:
+    """Heads (B,) and members (B, M) as kernels take them; the members are a copy."""
+    heads, members = np.ascontiguousarray(cluster.head, np.int64), np.array(cluster.members, np.int32, order="C")
+    if heads.shape != (rows,) or members.ndim != 2 or len(members) != rows:
+        raise ValueError(f"cluster has head {heads.shape}, members {members.shape}: must be ({rows},), ({rows}, M)")
+    return heads, members
 
 
 def empty_state(scenario: Scenario, rows: int, particles: int) -> State:
@@ -194,7 +205,7 @@ def empty_outcome(state: State) -> Outcome:
 
 
 @kernel
-def _begin(start, stop, cs, rows, keys, motion, numbers, recordings, starts, state):
+def _begin(start, stop, cs, rows, keys, motion, numbers, recordings, starts, placed, state):
     """Field, track, batteries, lam and the first belief of new episodes."""
     c, s = cs[0], starts[0]
     for b in range(start, stop):
@@ -210,8 +221,8 @@ def _begin(start, stop, cs, rows, keys, motion, numbers, recordings, starts, sta
             ratio = log(s.high / s.low)
             state.lam[b] = s.low * exp(ratio * draws.uniform(draws.stream(key, 0, draws.LAM), 0))
         network = state.network
-        if s.placed:
-            network.positions[b] = s.positions
+        if len(placed) > 0:
+            network.positions[b] = placed
         else:
             scatter(draws.stream(s.field_key if s.seeded else key, 0, draws.FIELD), c.side_m, network.positions[b])
         network.battery[b] = s.battery
@@ -219,6 +230,7 @@ def _begin(start, stop, cs, rows, keys, motion, numbers, recordings, starts, sta
         network.head[b] = -1
         network.n_members[b] = 0
         state.reports.count[b] = 0
+        state.belief.n_eff[b] = state.belief.particles.shape[2]
         track_stream = draws.stream(key, 0, draws.TRACK)
         draw_track(motion, numbers, recordings, track_stream, c.period_s, c.side_m, state.track[b])
         _first_belief(draws.stream(key, 0, draws.START), state.track[b, 0], s, c, state.belief.mean[b], state.belief.cov[b])

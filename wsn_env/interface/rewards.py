@@ -1,5 +1,7 @@
 """Rewards: minus (error + lam * energy), in metres."""
 
+from functools import partial
+
 import numpy as np
 
 from wsn_env.scenario import suggest
@@ -33,5 +35,8 @@ def make_reward(name: str):
     """
     if name not in REWARDS:
         raise ValueError(f"reward {name!r} is unknown: {suggest(name, REWARDS)}")
-    cost = REWARDS[name]
-    return lambda outcome, lam: -(cost(outcome) + lam * outcome.energy_mj)
+    return partial(_reward, REWARDS[name])
+
+
+def _reward(cost, outcome: Outcome, lam: np.ndarray) -> np.ndarray:
+    return -(cost(outcome) + lam * outcome.energy_mj)

@@ -37,11 +37,20 @@ def _check_room(scenario: Scenario) -> None:
     name = type(motion).__name__
     if name == "Crossing":
         room = (side - 2 * motion.margin_m) * 2**0.5
+        if room <= 0:
+            raise ScenarioError(f"Crossing.margin_m = {motion.margin_m}: must be below half the side, {side / 2} m")
         if motion.crossing_m > 0.9 * room:
             raise ScenarioError(
                 f"Crossing.crossing_m = {motion.crossing_m}: must be at most {0.9 * room:.1f} m in a field of {side} m"
                 f" with a margin of {motion.margin_m} m"
             )
+    if name in ("Turns", "Waypoint") and motion.speed_ms * scenario.period_s > side:
+        raise ScenarioError(
+            f"{name}.speed_ms = {motion.speed_ms}: must be at most {side / scenario.period_s} m/s, a side of the field"
+            " in a period"
+        )
+    if name in ("Sine", "Circle") and motion.turn_s < scenario.period_s:
+        raise ScenarioError(f"{name}.turn_s = {motion.turn_s}: must be at least a period, {scenario.period_s} s")
     if name == "Circle" and motion.circle_m > side / 2:
         raise ScenarioError(f"Circle.circle_m = {motion.circle_m}: must be at most half the side, {side / 2} m")
     if name == "Sine" and motion.amplitude_m > side / 2:
@@ -206,7 +215,7 @@ def read_track(path: str, scenario: Scenario) -> np.ndarray:
     """
     times, points = [], []
     try:
-        with open(path, newline="") as file:
+        with open(path, newline="", encoding="utf-8-sig") as file:
             table = csv.DictReader(file)
             missing = [name for name in "txy" if name not in (table.fieldnames or ())]
             if missing:
@@ -224,7 +233,7 @@ def read_track(path: str, scenario: Scenario) -> np.ndarray:
                     raise ScenarioError(f"{path}, line {table.line_num}: t={t} must be later than {times[-1]}")
                 times.append(t)
                 points.append((x, y))
-    except (OSError, UnicodeDecodeError) as problem:
+    except (OSError, UnicodeDecodeError, csv.Error) as problem:
         raise ScenarioError(f"track {path!r} cannot be read: {problem}") from None
     if len(times) < 2:
         raise ScenarioError(f"{path}: has {len(times)} points: at least 2 are needed")

@@ -25,7 +25,7 @@ def spread(stream, mean, cov, x, log_weights):
     """
     for axis in (0, 2):
         sd = np.sqrt(cov[axis, axis])
-        slope = cov[axis, axis + 1] / sd
+        slope = cov[axis, axis + 1] / sd if sd > 0.0 else 0.0
         rest = np.sqrt(max(cov[axis + 1, axis + 1] - slope * slope, 0.0))
         for i in range(x.shape[1]):
             e0, e1 = draws.normal_pair32(draws.bits(stream, axis * x.shape[1] + i))
@@ -53,7 +53,7 @@ def weigh(x, log_weights, first, step, position, value, c):
     """Add a report's log likelihood to every step-th particle from the first on."""
     px, py = x[0], x[2]
     n = x.shape[1]
-    half_precision = F(0.5 / (c.noise * c.noise))
+    half_precision = F(0.5 / max(c.noise * c.noise, 1e-20))
     if c.model == POSITION:
         zx, zy = F(value[0]), F(value[1])
         for i in range(first, n, step):
@@ -71,12 +71,13 @@ def weigh(x, log_weights, first, step, position, value, c):
             log_weights[i] -= half_precision * (r * r)
     else:
         log_floor = log32(floor)
-        top = F(c.level * exp(-c.slope * np.float64(log_floor)))  # the power at the floor, the greatest there is
+        top = F(c.level * exp(-c.slope * np.float64(log_floor)) / c.noise)  # at the floor, the greatest there is
+        z = F(value[0] / c.noise)  # powers in units of the noise: their own may be too small for float32
         for i in range(first, n, step):
             dx = px[i] - sx
             dy = py[i] - sy
             r = z - top * exp32(-slope * (log32(max(dx * dx + dy * dy, floor)) - log_floor))
-            log_weights[i] -= half_precision * (r * r)
+            log_weights[i] -= F(0.5) * (r * r)
 
 
 @piece

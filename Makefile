@@ -1,0 +1,36 @@
+# `make train` trains a scheduler and compares it, `make test` runs the tests; both set up .venv first.
+PYTHON ?= python3
+LAM ?= 4
+# An index of CPU wheels of torch, where the default index would bring a CUDA build: TORCH_INDEX="--index-url URL"
+TORCH_INDEX ?=
+
+VENV := .venv
+RUN := $(VENV)/bin/python
+READY := $(VENV)/.ready
+
+.PHONY: train test slow bench lint clean
+
+train: $(READY)
+	$(RUN) train.py --resume --lam $(LAM)
+
+test: $(READY)
+	$(RUN) -m pytest
+
+# Long studies; SHORT=1 runs their short form.
+slow: $(READY)
+	WSN_SHORT=$(SHORT) $(RUN) -m pytest -m slow
+
+bench: $(READY)
+	$(RUN) -m benchmarks.environment
+
+lint: $(READY)
+	$(VENV)/bin/ruff check . && $(VENV)/bin/ruff format --check .
+
+$(READY): pyproject.toml constraints.txt Makefile
+	$(PYTHON) -m venv $(VENV)
+	$(RUN) -m pip install --quiet --disable-pip-version-check torch==2.13.0 $(TORCH_INDEX) -c constraints.txt
+	$(RUN) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[test]"
+	touch $@
+
+clean:
+	rm -rf $(VENV) build *.egg-info

@@ -1,0 +1,120 @@
+"""The native vector environment as a stable-baselines3 VecEnv."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from stable_baselines3.common.vec_env import VecEnv
+
+from wsn_env.vector_env import ClusterVectorEnv
+
+
+class SB3VecEnv(VecEnv):
+    """Steps all rows at once, bit-identical to a DummyVecEnv of single environments.
+
+    Infos are filled for rows that end (their last info, terminal_observation, TimeLimit.truncated); the others' are empty.
+
+    Args:
+        envs: in same-step or disabled autoreset mode. Next-step's extra reset row is no transition: it is refused.
+        lam_scale: rewards are divided by 1 + lam_scale * lam, so that their size is alike for every lam.
+        stagger: let the rows' first episodes end early, evenly spread, as truncations: later resets stay spread.
+            Disabled mode only.
+    """
+
+    def __init__(self, envs: ClusterVectorEnv, lam_scale: float = 0.0, stagger: bool = False):
+        if envs.autoreset_mode == AutoresetMode.NEXT_STEP:
+            raise ValueError("autoreset_mode NextStep makes rows that are no transitions: use SameStep or Disabled")
+        if stagger and envs.autoreset_mode != AutoresetMode.DISABLED:
+            raise ValueError("stagger=True needs autoreset_mode Disabled")
+        self.envs = envs
+        self.seconds = 0.0  # wall time spent in step and reset
+        super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
+        self._lam_scale = lam_scale
+        self._first_end = np.full(envs.num_envs, -1)
+        if stagger:
+            self._first_end = 1 + np.arange(envs.num_envs) * envs.scenario.periods // envs.num_envs
+        self._steps = 0
+
+    def reset(self):
+        """New episodes in all rows."""
+        observation, info = self.envs.reset(seed=list(self._seeds))
+        self.reset_infos = [_row_info(info, i) for i in range(self.num_envs)]
+        self._reset_seeds()
+        self._reset_options()
+        self._steps = 0
+        return observation
+
+    def step_async(self, actions) -> None:
+        """Remember the actions."""
+        self._actions = actions
+
+    def step_wait(self):
+        """One period; ended rows give the first observation of their next episode."""
+        started = time.perf_counter()
+        result = self._step()
+        self.seconds += time.perf_counter() - started
+        return result
+
+    def _step(self):
+        lam = self.envs.lam.copy()
+        observation, rewards, terminated, truncated, info = self.envs.step(self._actions)
+        self._steps += 1
+        truncated = truncated | (self._first_end == self._steps)
+        done = terminated | truncated
+        infos: list[dict] = [{} for _ in range(self.num_envs)]
+        if done.any():
+            same_step = self.envs.autoreset_mode == AutoresetMode.SAME_STEP
+            last = info["final_info"] if same_step else info
+            for i in np.flatnonzero(done):
+                infos[i] = _row_info(last, i)
+                infos[i]["terminal_observation"] = info["final_obs"][i] if same_step else _row(observation, i)
+                infos[i]["TimeLimit.truncated"] = bool(truncated[i] and not terminated[i])
+            if not same_step:
+                observation, _ = self.envs.reset(options={"reset_mask": done})
+        # A copy in float32: stable-baselines3 adds the bootstrapped value in place.
+        return observation, (rewards / (1 + self._lam_scale * lam)).astype(np.float32), done, infos
+
+    def close(self) -> None:
+        """Close the environments."""
+        self.envs.close()
+
+    def get_attr(self, attr_name: str, indices=None) -> list[Any]:
+        """An attribute of the vector environment, once for each row."""
+        return [getattr(self.envs, attr_name) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices=None) -> None:
+        """Refused: the rows share one environment."""
+        raise AttributeError(f"cannot set {attr_name!r} of single rows: make the environment with other settings")
+
+    def env_method(self, method_name: str, *method_args, indices=None, **method_kwargs) -> list[Any]:
+        """Call a batched method, such as action_masks(), and slice its answer."""
+        answer = getattr(self.envs, method_name)(*method_args, **method_kwargs)
+        return [answer[i] for i in self._get_indices(indices)]
+
+    def env_is_wrapped(self, wrapper_class, indices=None) -> list[bool]:
+        """Rows are never wrapped one by one."""
+        return [False for _ in self._get_indices(indices)]
+
+    def has_attr(self, attr_name: str) -> bool:
+        """Whether the vector environment has the attribute."""
+        return hasattr(self.envs, attr_name)
+
+    def get_images(self):
+        """Frames of all rows."""
+        return self.envs.render()
+
+
+def _row(arrays, i: int):
+    return {name: value[i].copy() for name, value in arrays.items()} if isinstance(arrays, dict) else arrays[i].copy()
+
+
+def _row_info(info: dict, i: int) -> dict:
+    """Row i of a Gymnasium vector info, as plain values."""
+    row = {}
+    for name, value in info.items():
+        if not name.startswith("_") and name not in ("final_obs", "final_info") and info[f"_{name}"][i]:
+            row[name] = value[i] if np.ndim(value[i]) else value[i].item()
+    return row

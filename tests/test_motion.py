@@ -1,0 +1,245 @@
+"""Tracks: inside the field, at the right speeds, and honest about bad files."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wsn_env import Scenario, ScenarioError, World
+
+KEYS = st.integers(0, 2**64 - 1)
+
+
+def tracks(count=1, key=0, **overrides):
+    """(count, periods + 1, 4) tracks of as many rows."""
+    world = World(Scenario.named("PreDC-v0", **(dict(particles=2, nodes=1) | overrides)), threads=1)
+    keys = np.array([(key + i) % 2**64 for i in range(count)], np.uint64)
+    return world.reset(keys).track
+
+
+def positive(low, high):
+    return st.floats(low, high, allow_nan=False)
+
+
+@st.composite
+def motions(draw):
+    """Overrides that name a built-in motion with settings of all sizes that fit the field."""
+    side, period = draw(positive(1, 1000)), draw(positive(0.01, 60))
+    name = draw(st.sampled_from(["crossing", "straight", "sine", "circle", "turns", "waypoint"]))
+    speed = positive(1e-3, side / period)
+    own = {
+        "crossing": lambda: dict(
+            margin_m=side * draw(positive(0, 0.4)),
+            crossing_m=side * draw(positive(0.01, 0.25)),
+            acceleration_ms2=draw(positive(0, 10)),
+        ),
+        "straight": lambda: dict(from_m=draw(positive(0, 2 * side)), velocity_ms=draw(positive(-1000, 1000))),
+        "sine": lambda: dict(
+            speed_ms=draw(positive(1e-3, 100)),
+            amplitude_m=side * draw(positive(0, 0.5)),
+            turn_s=period * draw(positive(1, 1000)),
+        ),
+        "circle": lambda: dict(circle_m=side * draw(positive(0.01, 0.5)), turn_s=period * draw(positive(1, 1000))),
+        "turns": lambda: dict(speed_ms=draw(speed), turn_probability=draw(positive(0, 1))),
+        "waypoint": lambda: dict(speed_ms=draw(speed)),
+    }[name]()
+    return dict(motion=name, side_m=side, period_s=period, periods=draw(st.integers(1, 150))) | own
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(motions(), KEYS)
+def test_every_track_stays_inside_the_field(overrides, key):
+    track = tracks(4, key, **overrides)
+    assert track.shape == (4, overrides["periods"] + 1, 4)
+    assert np.isfinite(track).all()
+    assert track[:, :, ::2].min() >= 0 and track[:, :, ::2].max() <= overrides["side_m"]
+
+
+def test_crossings_join_two_far_points_of_the_inner_field():
+    track = tracks(300, acceleration_ms2=0.0)
+    start, end = track[:, 0, ::2], track[:, -1, ::2]
+    assert np.linalg.norm(end - start, axis=1).min() >= 40 - 1e-9
+    for point in (start, end):
+        assert point.min() >= 10 - 1e-9 and point.max() <= 90 + 1e-9
+    np.testing.assert_allclose(track[:, 0, 1::2] * 100, end - start, atol=1e-9)
+    np.testing.assert_allclose(np.diff(track[:, :, ::2], axis=1), track[:, :-1, 1::2], atol=1e-9)
+
+
+def test_the_crossings_noise_is_white_acceleration():
+    track = tracks(200)
+    inside = (track[:, :, ::2] > 1).all(axis=(1, 2)) & (track[:, :, ::2] < 99).all(axis=(1, 2))  # not reflected
+    velocity = track[inside][:, :, 1::2]
+    a = np.diff(velocity, axis=1).ravel()
+    assert abs(a.mean()) < 4 * 0.025 / a.size**0.5
+    assert abs(a.std() / 0.025 - 1) < 4 / (2 * a.size) ** 0.5
+    middle = (velocity[:, 1:] + velocity[:, :-1]) / 2  # x + T v + T^2/2 a is the mean velocity's way
+    np.testing.assert_allclose(np.diff(track[inside][:, :, ::2], axis=1), middle, atol=1e-9)
+
+
+def test_the_straight_diagonal():
+    track = tracks(1, motion="straight")[0]
+    np.testing.assert_allclose(track[:, 0], 5 + 0.9 * np.arange(101), atol=1e-12)
+    np.testing.assert_array_equal(track[:, 0], track[:, 2])
+    assert (track[:, 1::2] == 0.9).all()
+
+
+def test_a_straight_track_is_reflected_at_the_border():
+    track = tracks(1, motion="straight", velocity_ms=1.0, from_m=90)[0]
+    assert track[10, 0] == 100 and track[15, 0] == 95 and track[15, 1] == -1 and track[9, 1] == 1
+
+
+def test_the_circle():
+    track = tracks(1, motion="circle")[0]
+    offset = track[:, ::2] - 50
+    np.testing.assert_allclose(np.linalg.norm(offset, axis=1), 30, atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(track[:, 1::2], axis=1), 2 * np.pi * 30 / 100, rtol=1e-9)
+    np.testing.assert_allclose((offset * track[:, 1::2]).sum(axis=1), 0, atol=1e-9)
+    np.testing.assert_allclose(track[100], track[0], atol=1e-9)
+
+
+def test_the_sine():
+    track = tracks(1, motion="sine")[0]
+    t = np.arange(101)
+    np.testing.assert_allclose(track[:, 0], 5 + 0.9 * t, atol=1e-9)
+    np.testing.assert_allclose(track[:, 2], 50 + 25 * np.sin(2 * np.pi * t / 100), atol=1e-9)
+    np.testing.assert_allclose(track[:, 3], 0.5 * np.pi * np.cos(2 * np.pi * t / 100), atol=1e-9)
+
+
+@pytest.mark.parametrize("motion", ["turns", "waypoint"])
+def test_wanderers_keep_their_speed(motion):
+    track = tracks(50, motion=motion, speed_ms=1.7)
+    np.testing.assert_allclose(np.linalg.norm(track[:, :, 1::2], axis=2), 1.7, rtol=1e-9)
+    way = np.linalg.norm(np.diff(track[:, :, ::2], axis=1), axis=2)
+    assert way.max() <= 1.7 + 1e-9  # less where a corner is cut
+    assert np.median(way) == pytest.approx(1.7, rel=1e-9)
+    assert track[:, :, ::2].std() > 15  # they get about
+
+
+def test_turns_are_as_frequent_as_wished_and_within_a_quarter_turn():
+    track = tracks(200, motion="turns", speed_ms=0.1, turn_probability=0.2)
+    away = (np.abs(track[:, :, ::2] - 50) < 49).all(axis=2)  # from the border's mirror
+    heading = np.unwrap(np.arctan2(track[:, :, 3], track[:, :, 1]), axis=1)
+    turn = np.diff(heading, axis=1)[away[:, 1:] & away[:, :-1]]
+    turned = np.abs(turn) > 1e-9
+    assert abs(turned.mean() - 0.2) < 4 * (0.16 / turn.size) ** 0.5
+    assert np.abs(turn).max() <= np.pi / 2 + 1e-9
+    assert abs(turn[turned].std() - np.pi / 12**0.5) < 4 * np.pi / 12**0.5 / turned.sum() ** 0.5
+
+
+def test_tracks_differ_from_key_to_key_and_repeat_with_it():
+    for motion in ("crossing", "turns", "waypoint"):
+        some = tracks(20, motion=motion)
+        assert len(np.unique(some[:, 0, 0])) == 20
+        np.testing.assert_array_equal(tracks(1, 7, motion=motion)[0], some[7])
+
+
+@pytest.mark.parametrize(
+    ("overrides", "names"),
+    [
+        (dict(motion="crossing", crossing_m=150), "Crossing.crossing_m = 150"),
+        (dict(motion="crossing", margin_m=50), "Crossing.margin_m = 50"),
+        (dict(motion="circle", circle_m=51), "Circle.circle_m = 51"),
+        (dict(motion="circle", turn_s=0.1), "Circle.turn_s = 0.1"),
+        (dict(motion="sine", amplitude_m=51), "Sine.amplitude_m = 51"),
+        (dict(motion="sine", turn_s=0.9), "Sine.turn_s = 0.9"),
+        (dict(motion="waypoint", speed_ms=1e300), "Waypoint.speed_ms = 1e+300"),
+        (dict(motion="turns", speed_ms=101), "Turns.speed_ms = 101"),
+    ],
+)
+def test_motions_without_room_are_refused(overrides, names):
+    with pytest.raises(ScenarioError) as problem:
+        tracks(1, **overrides)
+    assert names in str(problem.value) and "must be" in str(problem.value)
+
+
+# --- recorded tracks ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(text, name="walk.csv", encoding="utf-8"):
+        path = tmp_path / name
+        path.write_text(text, encoding=encoding)
+        return str(path)
+
+    return write
+
+
+def recorded(*paths, count=1, key=0, **overrides):
+    return tracks(count, key, motion="recorded", tracks=paths, **overrides)
+
+
+def test_a_recorded_track_is_resampled_to_the_horizon(write):
+    path = write("t,x,y\n0,10,20\n4,30,20\n10,30,80\n")
+    track = recorded(path, span_m=None, periods=10)[0]
+    np.testing.assert_allclose(track[:, 0], [10, 15, 20, 25, 30, 30, 30, 30, 30, 30, 30])
+    np.testing.assert_allclose(track[:, 2], [20, 20, 20, 20, 20, 30, 40, 50, 60, 70, 80])
+    np.testing.assert_allclose(track[:, 1], [5, 5, 5, 5, 2.5, 0, 0, 0, 0, 0, 0])
+    twice = recorded(path, span_m=None, periods=20, period_s=0.5)[0]
+    np.testing.assert_allclose(twice[::2, ::2], track[:, ::2])
+
+
+def test_a_recorded_track_is_scaled_and_centred(write):
+    path = write("t,y,x,extra\n5,1000,-7,a\n6,1001,-7,b\n7,1001,-5,c\n")  # 2 m wide, 1 m high
+    track = recorded(path, periods=2)[0]
+    np.testing.assert_allclose(track[:, 0], [10, 10, 90])
+    np.testing.assert_allclose(track[:, 2], [30, 70, 70])
+    small = recorded(path, periods=2, span_m=500.0)[0]  # no larger than the field
+    np.testing.assert_allclose(small[:, 0], [0, 0, 100])
+
+
+def test_an_episode_picks_one_of_the_recordings_by_its_key(write):
+    paths = [write(f"t,x,y\n0,{x},1\n1,{x},2\n", f"{x}.csv") for x in (10, 20, 30)]
+    starts = recorded(*paths, count=600, span_m=None)[:, 0, 0]
+    counts = np.array([(starts == x).sum() for x in (10, 20, 30)])
+    assert counts.sum() == 600
+    assert (np.abs(counts - 200) < 4 * (600 * 2 / 9) ** 0.5).all()
+
+
+def test_spreadsheets_write_a_byte_order_mark(write):
+    assert np.isfinite(recorded(write("t,x,y\n0,1,1\n1,2,2\n", encoding="utf-8-sig"))).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("t,x\n0,1\n1,2\n", "column 'y' is missing"),
+        ("", "column 't' is missing"),
+        ("t,x,y\n0,1,1\n1,nan,2\n", "line 3: t=1.0, x=nan"),
+        ("t,x,y\n0,1,1\n1,inf,2\n", "line 3"),
+        ("t,x,y\n0,1,1\n1,two,2\n", "line 3"),
+        ("t,x,y\n0,1,1\n1,2\n", "line 3"),
+        ("t,x,y\n0,1,1\n\n2,1,1\n2,2,2\n", "line 5: t=2.0 must be later than 2.0"),
+        ("t,x,y\n0,1,1\n-1,2,2\n", "line 3: t=-1.0 must be later than 0.0"),
+        ("t,x,y\n0,1,1\n", "has 1 points: at least 2"),
+        ("t,x,y\n", "has 0 points: at least 2"),
+        ("t,x,y\n0,1,1\n1,1,1\n", "does not move"),
+        ("t,x,y\n0," + "9" * 200_000 + ",1\n", "cannot be read"),
+    ],
+)
+def test_bad_files_are_named_with_the_line(write, text, message):
+    path = write(text)
+    with pytest.raises(ScenarioError) as problem:
+        recorded(path)
+    assert path in str(problem.value) and message in str(problem.value)
+
+
+def test_missing_and_unreadable_files_are_named(tmp_path):
+    picture = tmp_path / "picture.csv"
+    picture.write_bytes(b"\xff\xd8\xff\xe0 not text")
+    for path in (tmp_path / "none.csv", tmp_path, picture):
+        with pytest.raises(ScenarioError) as problem:
+            recorded(str(path))
+        assert str(path) in str(problem.value) and "cannot be read" in str(problem.value)
+
+
+def test_a_recording_outside_the_field_is_refused_unless_scaled(write):
+    path = write("t,x,y\n0,-1,5\n1,7,5\n")
+    with pytest.raises(ScenarioError, match="must lie in the field"):
+        recorded(path, span_m=None)
+    assert recorded(path).min() < 100
+
+
+def test_recorded_needs_a_file():
+    with pytest.raises(ScenarioError, match="Recorded.tracks"):
+        Scenario.named("PreDC-v0", motion="recorded")

@@ -1,0 +1,159 @@
+"""Hand-written policies do what their papers and names say."""
+
+import subprocess
+import sys
+import textwrap
+
+import numpy as np
+import pytest
+
+from agents.nearest import Nearest
+from agents.pre_dc import PreDC
+from wsn_env import Scenario, View, World, draws, make_policy
+from wsn_env.physics.sensing import detection_probability
+from wsn_env.policies import policy_names
+from wsn_env.types import Cluster
+
+SCENARIO = Scenario.named("PreDC-v0", particles=200)
+
+
+@pytest.fixture(scope="module")
+def view():
+    """Forty rows, some periods into their episodes, led by nearest3."""
+    return View.of(walked())
+
+
+def walked(periods=9, scenario=SCENARIO, policy="nearest3"):
+    world = World(scenario, threads=1)
+    state = world.reset([draws.key_of_seed(seed) for seed in range(40)])
+    chooser = make_policy(policy, scenario)
+    for _ in range(periods):
+        state, _ = world.step(state, chooser.act(View.of(state)), donate=True)
+    return state
+
+
+def chosen(cluster: Cluster, row: int) -> set[int]:
+    return {int(node) for node in cluster.members[row] if node >= 0} | {int(cluster.head[row])}
+
+
+def test_every_name_is_an_entry_point():
+    expected = {"pre_dc", "centroid", "static_cluster", "random", "all", "ppo", *(f"nearest{n}" for n in range(9))}
+    assert expected <= set(policy_names())
+    with pytest.raises(ValueError, match="did you mean pre_dc"):
+        make_policy("predc", SCENARIO)
+
+
+def test_pre_dc_forms_until_the_joint_probability_passes_theta(view):
+    policy = PreDC(SCENARIO, phi0_m=1e-9)  # never keeps
+    cluster = policy.act(view)
+    for row in range(40):
+        order = np.argsort(view.distance[row])
+        assert cluster.head[row] == order[0]
+        p = detection_probability(view.distance[row][order], SCENARIO.detection)
+        joint = 1 - np.cumprod(1 - p)
+        size = int(np.argmax(joint > 0.9)) + 1 if (joint > 0.9).any() else int((p > 0).sum())
+        assert chosen(cluster, row) == set(order[:size].tolist()), row
+
+
+def test_pre_dc_keeps_while_sharp_and_covering_and_else_not(view):
+    kept = PreDC(SCENARIO, phi0_m=1e9, theta=1e-12).act(view)
+    assert all(chosen(kept, row) == set(np.flatnonzero(view.member[row])) for row in range(40))
+    default = PreDC(SCENARIO).act(view)
+    p = detection_probability(view.distance, SCENARIO.detection)
+    joint = 1 - np.prod(np.where(view.member, 1 - p, 1), axis=1)
+    keep = (view.spread_m < 2) & (joint >= 0.9)
+    assert 2 < keep.sum() < 38
+    for row in range(40):
+        stays = chosen(default, row) == set(np.flatnonzero(view.member[row]))
+        assert stays == keep[row] or not keep[row]
+
+
+def test_pre_dc_takes_all_who_can_when_theta_is_out_of_reach():
+    scenario = SCENARIO.override(nodes=25)  # two or three nodes in reach
+    view = View.of(walked(3, scenario))
+    cluster = PreDC(scenario, phi0_m=1e-9, theta=0.999).act(view)
+    p = detection_probability(view.distance, scenario.detection)
+    for row in range(40):
+        assert chosen(cluster, row) == set(np.flatnonzero(p[row] > 0)) | {int(cluster.head[row])}
+
+
+def test_pre_dc_passes_over_a_head_without_energy(view):
+    nearest = view.nearest_living()
+    battery = view.battery.copy()
+    battery[np.arange(40), nearest] = 1e-6  # alive, but a handover costs more
+    poor = View.of(walked())
+    poor = type(poor)(**{**vars_of(poor), "network": poor.network._replace(battery=battery)})
+    head = PreDC(SCENARIO, phi0_m=1e-9).act(poor).head
+    assert (head != nearest).all()
+    assert (head == poor.nearest(2)[0][:, 1]).all()
+
+
+def vars_of(view: View) -> dict:
+    names = "period lam luck log_miss mean cov predicted_mean predicted_cov network reports".split()
+    return {name: getattr(view, name) for name in names}
+
+
+def test_centroid_has_no_motion_model(view):
+    policy = make_policy("centroid", SCENARIO)
+    cluster = policy.act(view)
+    for row in range(40):
+        heard = view.detected[row]
+        if not heard.any():
+            assert chosen(cluster, row) == set(np.flatnonzero(view.member[row]))
+            continue
+        distance = np.hypot(*(view.positions[row] - view.positions[row][heard].mean(axis=0)).T)
+        assert cluster.head[row] == distance.argmin()
+        assert chosen(cluster, row) == set(np.flatnonzero(distance <= 10)) | {int(cluster.head[row])}
+
+
+def test_static_cluster_and_all(view):
+    p = detection_probability(view.distance, SCENARIO.detection)
+    static, everybody = (make_policy(name, SCENARIO).act(view) for name in ("static_cluster", "all"))
+    for row in range(40):
+        assert chosen(static, row) == set(np.flatnonzero(p[row] > 0)) | {int(view.distance[row].argmin())}
+        assert len(chosen(everybody, row)) == 225
+    assert (static.head == view.distance.argmin(axis=1)).all()
+
+
+@pytest.mark.parametrize("n", range(9))
+def test_nearest_counts_further_members_and_keeps_its_head(view, n):
+    cluster = make_policy(f"nearest{n}", SCENARIO).act(view)
+    eager = Nearest(SCENARIO, n=n, hysteresis_m=0.0).act(view)
+    distance = view.distance[view.rows, view.head]
+    assert (cluster.head == np.where(distance <= 8, view.head, view.distance.argmin(axis=1))).all()
+    assert (eager.head == view.distance.argmin(axis=1)).all()
+    for row in range(40):
+        others = [node for node in np.argsort(view.distance[row]) if node != cluster.head[row]][:n]
+        assert chosen(cluster, row) == {*others, int(cluster.head[row])}
+
+
+def test_random_repeats_itself_and_differs_between_rows_and_periods(view):
+    policy = make_policy("random", SCENARIO)
+    first, again = policy.act(view), policy.act(view)
+    assert (first.head == again.head).all() and (first.members == again.members).all()
+    sizes = [len(chosen(first, row)) for row in range(40)]
+    assert len(set(sizes)) > 3
+
+
+def test_a_package_of_ones_own_adds_a_policy(tmp_path):
+    """An entry point in another distribution is found by name."""
+    (tmp_path / "mine.py").write_text(
+        textwrap.dedent(
+            """
+            from agents.nearest import Nearest
+            def lazy(scenario):
+                return Nearest(scenario, n=1, hysteresis_m=20.0)
+            """
+        )
+    )
+    info = tmp_path / "mine-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[wsn_env.policies]\nlazy = mine:lazy\n")
+    code = (
+        f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
+        "from wsn_env import Scenario, make_policy\n"
+        "print(make_policy('lazy', Scenario()).hysteresis_m)"
+    )
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert answer.stdout.strip() == "20.0"

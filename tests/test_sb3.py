@@ -1,0 +1,105 @@
+"""stable-baselines3: the adapter against DummyVecEnv, and policies in evaluate_policy."""
+
+import itertools
+
+import numpy as np
+import pytest
+from stable_baselines3.common.env_util import make_vec_env
+from stable_baselines3.common.evaluation import evaluate_policy
+from stable_baselines3.common.vec_env import DummyVecEnv, VecFrameStack
+
+from agents.sb3 import SB3VecEnv
+from tests.test_env import same
+from wsn_env import ClusterEnv, ClusterVectorEnv, Scenario, make_policy
+from wsn_env.evaluation import evaluate
+from wsn_env.policies import policy_names
+
+SMALL = dict(particles=50, nodes=30, side_m=50.0, crossing_m=20.0, periods=13)
+
+
+@pytest.mark.parametrize(
+    "mode,observation,action",
+    list(itertools.product(("SameStep", "Disabled"), ("candidates", "dict", "view"), ("menu", "subset"))),
+)
+def test_adapter_equals_dummy_vec_env(mode, observation, action):
+    """300 steps: observations, rewards, dones, terminal observations, truncation and last infos, to the bit."""
+    rows, settings = 9, dict(observation=observation, action=action, lam=(0.5, 8.0), **SMALL)
+    ours = SB3VecEnv(ClusterVectorEnv(rows, autoreset_mode=mode, **settings))
+    theirs = DummyVecEnv([lambda: ClusterEnv(**settings)] * rows)
+    for envs in (ours, theirs):
+        envs.seed(11)
+    assert same(ours.reset(), theirs.reset())
+    rng, ended = np.random.default_rng(0), 0
+    ours.action_space.seed(0)
+    for _ in range(300):
+        actions = np.array([ours.action_space.sample() for _ in range(rows)])
+        if action == "menu":
+            actions = rng.integers(0, 19, rows)
+        left, right = ours.step(actions), theirs.step(actions)
+        assert all(same(a, b) for a, b in zip(left[:3], right[:3]))
+        for i in np.flatnonzero(left[2]):
+            a, b = left[3][i], right[3][i]
+            assert same(a.pop("terminal_observation"), b.pop("terminal_observation"))
+            assert a["TimeLimit.truncated"] is True and same(a, b)
+            ended += 1
+    assert ended >= rows * 20
+
+
+def test_adapter_refuses_next_step_and_single_row_settings():
+    with pytest.raises(ValueError, match="NextStep"):
+        SB3VecEnv(ClusterVectorEnv(2, **SMALL))
+    with pytest.raises(ValueError, match="stagger"):
+        SB3VecEnv(ClusterVectorEnv(2, autoreset_mode="SameStep", **SMALL), stagger=True)
+    envs = SB3VecEnv(ClusterVectorEnv(2, autoreset_mode="SameStep", **SMALL))
+    with pytest.raises(AttributeError):
+        envs.set_attr("lam", 3.0)
+
+
+def test_staggered_rows_end_at_different_times():
+    rows = 13
+    envs = SB3VecEnv(ClusterVectorEnv(rows, autoreset_mode="Disabled", **SMALL), stagger=True)
+    envs.reset()
+    ends = np.array([envs.step(np.zeros(rows, int))[2] for _ in range(4 * SMALL["periods"])])
+    assert (ends.sum(axis=1) == 1).all() and (ends.sum(axis=0) == 4).all()
+
+
+def test_lam_scale_and_wrappers():
+    rows = 3
+    plain = SB3VecEnv(ClusterVectorEnv(rows, lam=4.0, autoreset_mode="SameStep", **SMALL))
+    scaled = SB3VecEnv(ClusterVectorEnv(rows, lam=4.0, autoreset_mode="SameStep", **SMALL), lam_scale=0.3)
+    stacked = VecFrameStack(SB3VecEnv(ClusterVectorEnv(rows, autoreset_mode="SameStep", **SMALL)), 2)
+    for envs in (plain, scaled, stacked):
+        envs.seed(0)
+        envs.reset()
+    a, b, _ = (envs.step(np.full(rows, 13)) for envs in (plain, scaled, stacked))
+    assert np.allclose(a[1], b[1] * 2.2, rtol=1e-6) and a[1].dtype == np.float32
+    assert np.array(plain.env_method("action_masks", indices=[0, 2])).shape == (2, 19)
+
+
+@pytest.mark.parametrize("name", [name for name in policy_names() if name != "ppo"])
+def test_sb3_evaluate_policy_runs_policies_unchanged(name):
+    """The same episode returns as our own evaluation, through SB3's own environments."""
+    scenario = Scenario.named("PreDC-v0", **SMALL)
+    expected = evaluate([name], scenario, [3.0], episodes=2).rows
+    policy = make_policy(name, scenario)
+    kinds = dict(scenario=scenario, action="cluster", observation="view", lam=3.0)
+    returns = []
+    for row in expected:
+        envs = make_vec_env(lambda: ClusterEnv(**kinds), n_envs=1)
+        envs.seed(row["seed"])
+        returns += evaluate_policy(policy, envs, n_eval_episodes=1, return_episode_rewards=True)[0]
+    assert returns == pytest.approx([row["return"] for row in expected], abs=1e-6)  # Monitor rounds
+
+
+def test_predict_takes_one_environment_or_many():
+    scenario = Scenario.named("PreDC-v0", **SMALL)
+    policy = make_policy("pre_dc", scenario)
+    env = ClusterEnv(scenario, action="cluster", observation="view")
+    observation, _ = env.reset(seed=4)
+    action, memory = policy.predict(observation, state=None, episode_start=None, deterministic=True)
+    assert env.action_space.contains(action) and memory is None
+    envs = ClusterVectorEnv(3, scenario, action="cluster", observation="view")
+    many, _ = envs.reset(seed=4)
+    actions, _ = policy.predict(many)
+    assert len(actions) == 3 and same(actions[0], action)
+    envs.step(actions)

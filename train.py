@@ -1,0 +1,268 @@
+"""Train a PPO scheduler, then compare it with every baseline on episodes that neither has seen.
+
+    python train.py --lam 4
+
+Reads top to bottom: settings -> environment -> PPO -> saved policy -> paired comparison -> picture.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections import deque
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import numpy as np
+import torch
+import tyro
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import configure
+from stable_baselines3.common.vec_env import VecMonitor
+
+from agents.ppo import network_of, save_policy
+from agents.sb3 import SB3VecEnv
+from wsn_env.cli import parse_overrides, progress_bar
+from wsn_env.evaluation import evaluate, forget_blocks, replacing, versions
+from wsn_env.interface import Settings
+from wsn_env.policies import policy_names
+from wsn_env.reports import draw_front, print_tables
+from wsn_env.scenario import Scenario
+from wsn_env.vector_env import ClusterVectorEnv
+
+
+@dataclass
+class Training:
+    """Train a PPO scheduler and compare it with every baseline."""
+
+    # what is trained
+    scenario: str = "PreDC-v0"
+    """Scenario id."""
+    lam: float = 4.0
+    """Trade-off between error and energy [m/mJ]."""
+    tracks: list[Path] = field(default_factory=list)
+    """CSV files of recorded motion (columns t, x, y in s and m), to train and compare on instead of the scenario's."""
+    set: list[str] = field(default_factory=list)
+    """Scenario quantities, as name=value: nodes=400 particles=1000."""
+    order: str = "nearest"
+    """The menu's order of merit: nearest | information."""
+    reward: str = "belief"
+    """Training reward: belief (what the filter expects, low variance) | error (the true error)."""
+
+    # where it goes
+    name: str = ""
+    """Name of the run; left out: scenario and lam."""
+    runs: Path = Path("runs")
+    """Folder of all runs."""
+    resume: bool = False
+    """Continue the run of this name from its last checkpoint (or begin it)."""
+
+    # PPO
+    steps: int = 3_000_000
+    """Periods of training, over all rows."""
+    rows: int = 256
+    """Parallel fields."""
+    rollout: int = 64
+    """Periods of each row between two updates."""
+    batch: int = 4096
+    """Transitions in a minibatch."""
+    epochs: int = 8
+    """Passes over a rollout."""
+    learning_rate: float = 2e-3
+    """At the start; falls linearly to 0."""
+    gamma: float = 0.9
+    """Discount per period."""
+    gae_lambda: float = 0.9
+    """Of the generalised advantage estimate."""
+    entropy: float = 5e-4
+    """Weight of the entropy bonus."""
+    network: tuple[int, int] = (64, 64)
+    """Units of the two hidden layers."""
+    seed: int = 0
+    """Of training, below 2^31 - rows; evaluation seeds lie above."""
+    torch_threads: int = 1
+    """Cores for PPO's updates; more is slower as soon as anything else runs."""
+    checkpoint_steps: int = 500_000
+    """Periods between checkpoints."""
+
+    # comparison
+    episodes: int = 1000
+    """Held-out episodes of the paired comparison; 0: none."""
+    evaluation_seed: int = 0
+    """Which held-out episodes."""
+
+    @property
+    def folder(self) -> Path:
+        """Where everything of this run goes."""
+        return self.runs / (self.name or f"{self.scenario}-lam{self.lam:g}")
+
+
+def main() -> int:
+    """Run; bad input is one line and exit status 2, Ctrl-C leaves a checkpoint and is 130."""
+    settings = tyro.cli(Training, description=__doc__)
+    try:
+        train(settings)
+    except ValueError as problem:
+        print(f"train.py: {problem}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print(f"train.py: stopped; --resume continues {settings.folder}", file=sys.stderr)
+        return 130
+    return 0
+
+
+def train(settings: Training) -> None:
+    """The whole story."""
+    torch.set_num_threads(settings.torch_threads)
+    scenario = make_scenario(settings)
+    speaks = Settings(reward=settings.reward, order=settings.order)
+    folder = open_folder(settings)
+
+    envs = ClusterVectorEnv(
+        settings.rows, scenario, reward=speaks.reward, order=speaks.order, autoreset_mode="Disabled"
+    )
+    adapted = SB3VecEnv(envs, lam_scale=0.3, stagger=True)
+    model = make_model(settings, VecMonitor(adapted), folder)
+    left = settings.steps - model.num_timesteps
+    if left > 0:
+        started = time.perf_counter()
+        model.set_logger(configure(str(folder / f"progress-{model.num_timesteps}"), ["tensorboard", "csv"]))
+        with progress_bar() as report:
+            callback = Watch(settings, folder, report)
+            try:
+                model.learn(left, callback=callback, reset_num_timesteps=False)
+            finally:
+                save_checkpoint(model, folder)
+        seconds = time.perf_counter() - started
+        print(
+            f"trained {left:,} periods in {seconds:.0f} s ({left / seconds:,.0f} a second), "
+            f"{100 * adapted.seconds / seconds:.0f} % of it in the environment"
+        )
+
+    facts = {"training": plain(settings), "scenario": scenario.as_dict(), "versions": versions()}
+    policy = save_policy(folder, network_of(model), speaks, facts)
+    print(f"saved: {policy}")
+    if settings.episodes:
+        compare(settings, scenario, policy)
+
+
+def make_scenario(settings: Training) -> Scenario:
+    """The scenario with its overrides."""
+    scenario = Scenario.named(settings.scenario, lam=settings.lam, **parse_overrides(settings.set))
+    if settings.tracks:
+        scenario = scenario.override(motion="recorded", tracks=tuple(map(str, settings.tracks)))
+    return scenario
+
+
+def open_folder(settings: Training) -> Path:
+    """The run's folder with config.json; an existing run is only touched by --resume, with the same settings."""
+    folder = settings.folder
+    path = folder / "config.json"
+    if path.exists():
+        if not settings.resume:
+            raise ValueError(f"{folder} exists: --resume continues it, --name begins another, or remove it")
+        old, new = json.loads(path.read_text()), plain(settings)
+        free = {"resume", "runs", "episodes", "evaluation_seed", "torch_threads", "checkpoint_steps"}
+        differing = [name for name in new if name not in free and old.get(name) != new[name]]
+        if differing:
+            name = differing[0]
+            raise ValueError(f"{folder} was begun with {name} = {old.get(name)!r}: cannot resume it with {new[name]!r}")
+    folder.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as file:
+        json.dump(plain(settings), file, indent=1)
+    return folder
+
+
+def plain(settings: Training) -> dict:
+    """JSON values of the settings."""
+    return json.loads(json.dumps(asdict(settings), default=str))
+
+
+def make_model(settings: Training, envs, folder: Path) -> PPO:
+    """A new model, or the one of the last checkpoint."""
+    path = folder / "checkpoint.zip"
+    if path.exists():
+        try:
+            model = PPO.load(path, env=envs)
+        except Exception as problem:  # zipfile, pickle and torch raise all kinds for a damaged file
+            raise ValueError(f"{path} is cut short or no checkpoint: remove it to begin anew ({problem!r})") from None
+        envs.seed(settings.seed + 1_000_003 * (1 + model.num_timesteps % 1000))
+        return model
+    return PPO(
+        "MlpPolicy",
+        envs,
+        n_steps=settings.rollout,
+        batch_size=settings.batch,
+        n_epochs=settings.epochs,
+        learning_rate=Falling(settings.learning_rate),
+        gamma=settings.gamma,
+        gae_lambda=settings.gae_lambda,
+        ent_coef=settings.entropy,
+        policy_kwargs={"net_arch": list(settings.network)},
+        seed=settings.seed,
+        device="cpu",
+    )
+
+
+@dataclass
+class Falling:
+    """Learning rate that falls linearly to 0."""
+
+    start: float
+
+    def __call__(self, remaining: float) -> float:
+        return self.start * remaining
+
+
+def save_checkpoint(model: PPO, folder: Path) -> None:
+    """Whole or not at all."""
+    temporary = folder / ".checkpoint.zip"
+    model.save(temporary)
+    temporary.replace(folder / "checkpoint.zip")
+
+
+class Watch(BaseCallback):
+    """Progress bar and checkpoints."""
+
+    def __init__(self, settings: Training, folder: Path, report):
+        super().__init__()
+        self._settings, self._folder, self._report = settings, folder, report
+        self._saved = 0
+        self._rms = deque([float("nan")], maxlen=200)
+
+    def _on_step(self) -> bool:
+        self._rms.extend(info["episode_rms_m"] for info in self.locals["infos"] if "episode_rms_m" in info)
+        return True
+
+    def _on_rollout_end(self) -> None:
+        rms = float(np.nanmean(self._rms)) if len(self._rms) > 1 else float("nan")
+        self.logger.record("rollout/episode_rms_m", rms)
+        self._report(min(self.num_timesteps, self._settings.steps), self._settings.steps, f"training, RMS {rms:.2f} m")
+        if self.num_timesteps - self._saved >= self._settings.checkpoint_steps:
+            save_checkpoint(self.model, self._folder)
+            self._saved = self.num_timesteps
+
+
+def compare(settings: Training, scenario: Scenario, policy: Path) -> None:
+    """Paired comparison with every baseline at the trained lam: table, CSV, JSON, picture."""
+    from agents.ppo import PPOPolicy
+    from wsn_env.policies import make_policy
+
+    folder = settings.folder
+    policies = {"ppo": PPOPolicy(scenario, path=str(policy))}
+    policies |= {name: make_policy(name, scenario) for name in policy_names() if name != "ppo"}
+    with progress_bar() as report:
+        evaluation = evaluate(
+            policies, scenario, None, settings.episodes, settings.evaluation_seed, keep=folder, progress=report
+        )
+    evaluation.save(folder)
+    forget_blocks(folder)
+    print_tables(evaluation, reference="ppo")
+    draw_front(evaluation, settings.lam, folder / "comparison.png", emphasis="ppo")
+    print(f"written: {folder / 'evaluation.csv'}, {folder / 'comparison.png'}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,150 @@
+"""The command `wsn`, also `python -m wsn_env`: evaluate and reproduce."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from wsn_env.policies import policy_names
+from wsn_env.scenario import Scenario
+
+
+@dataclass
+class Evaluate:
+    """Compare policies on common random episodes: a table, evaluation.csv and evaluation.json."""
+
+    scenario: str = "PreDC-v0"
+    """Scenario id."""
+    policies: list[str] = field(
+        default_factory=lambda: ["pre_dc", "centroid", "static_cluster"]
+    )
+    """Policies by name, or paths of a saved policy.json; the first is the reference of the differences."""
+    lam: list[float] | None = None
+    """Trade-offs between error and energy [m/mJ]; left out: the scenario's."""
+    episodes: int = 100
+    """Episodes for each policy and lam."""
+    seed: int = 0
+    """Which episodes: evaluation seeds are 2^31 + seed * 10^5 + episode."""
+    tracks: list[Path] = field(default_factory=list)
+    """CSV files of recorded motion (t, x, y in s and m) instead of the scenario's motion."""
+    set: list[str] = field(default_factory=list)
+    """Scenario quantities, as name=value: nodes=400 particles=1000 tracker=ekf."""
+    out: Path | None = None
+    """Folder for the files; left out: only the table."""
+
+
+@dataclass
+class Reproduce:
+    """Rebuild a published system's tables and figures, with a verdict for each of its claims."""
+
+    paper: Annotated[str, tyro.conf.Positional]
+    """Which: pre_dc."""
+    out: Path
+    """Folder for the tables and pictures."""
+    runs: int = 100
+    """Monte Carlo runs a cell."""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run a command; bad input is one line on stderr and exit status 2, Ctrl-C is 130."""
+    commands = {"evaluate": Evaluate, "reproduce": Reproduce}
+    command = tyro.extras.subcommand_cli_from_dict(
+        {name: kind for name, kind in commands.items()}, prog="wsn", args=arguments
+    )
+    try:
+        run_evaluate(command) if isinstance(command, Evaluate) else run_reproduce(command)
+    except ValueError as problem:
+        print(f"wsn: {problem}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("wsn: stopped; what was finished is kept, the same command continues", file=sys.stderr)
+        return 130
+    return 0
+
+
+def run_evaluate(command: Evaluate) -> None:
+    """`wsn evaluate`."""
+    from wsn_env.evaluation import evaluate, forget_blocks
+    from wsn_env.reports import print_tables
+
+    scenario = Scenario.named(command.scenario, **parse_overrides(command.set))
+    if command.tracks:
+        scenario = scenario.override(motion="recorded", tracks=tuple(map(str, command.tracks)))
+    with progress_bar() as report:
+        evaluation = evaluate(
+            command.policies,
+            scenario,
+            command.lam,
+            command.episodes,
+            command.seed,
+            keep=command.out,
+            progress=report,
+        )
+    print_tables(evaluation)
+    if command.out:
+        evaluation.save(command.out)
+        forget_blocks(command.out)
+        print(f"written: {command.out / 'evaluation.csv'}, {command.out / 'evaluation.json'}")
+
+
+def run_reproduce(command: Reproduce) -> None:
+    """`wsn reproduce`."""
+    from wsn_env.papers import reproduce
+
+    reproduce(command.paper, command.out, command.runs)
+
+
+def parse_overrides(pairs: list[str]) -> dict:
+    """{"nodes": 400} from ["nodes=400"]; values are numbers, true/false, none, or words."""
+    overrides = {}
+    for pair in pairs:
+        name, equals, text = pair.partition("=")
+        if not equals:
+            raise ValueError(f"--set {pair!r}: must be name=value")
+        words = {"true": True, "false": False, "none": None}
+        value = words.get(text.lower(), text)
+        if value is text:
+            for kind in (int, float):
+                try:
+                    value = kind(text)
+                    break
+                except ValueError:
+                    continue
+        overrides[name] = value
+    return overrides
+
+
+class progress_bar:  # noqa: N801 - a context manager used like open()
+    """A rich progress bar on stderr; gives a function (done, total, text)."""
+
+    def __enter__(self):
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+            transient=True,
+        )
+        self._bar.start()
+        task = self._bar.add_task("", total=None)
+
+        def report(done: int, total: int, text: str) -> None:
+            self._bar.update(task, completed=done, total=total, description=text)
+
+        return report
+
+    def __exit__(self, *problem):
+        self._bar.stop()
+
+
+def known_policies() -> str:
+    """For help texts."""
+    return ", ".join(policy_names())

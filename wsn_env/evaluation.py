@@ -1,0 +1,282 @@
+"""Comparison of policies: paired rollouts over common seeds, intervals, tables, files.
+
+Every policy meets the same fields, tracks, detections and noises, so that differences are taken episode by episode. Work
+goes in blocks of 50 seeds, whatever the machine: the rows are the same to the byte. Finished blocks are kept beside the
+result, and a run that was stopped continues from them.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import json
+import os
+import platform
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import numpy as np
+
+from wsn_env import draws
+from wsn_env.policies import Policy, make_policy
+from wsn_env.scenario import Scenario
+from wsn_env.view import View
+from wsn_env.world import World
+
+BLOCK = 50
+FIRST_SEED, SEEDS_PER_RUN = 2**31, 10**5  # training seeds lie below FIRST_SEED
+COLUMNS = (
+    "policy scenario lam episode seed periods return error_m rms_m energy_mj members handovers searches lost bound_m"
+).split()
+MEANS = ("return", "rms_m", "error_m", "energy_mj", "members", "handovers", "searches", "lost")
+RESAMPLES = 2000
+
+Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Mean and 95 % bootstrap interval of one quantity, for one policy and lam."""
+
+    mean: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, values) -> Summary:
+        """Percentile bootstrap over episodes, with a fixed seed; no interval for a single episode."""
+        from scipy.stats import bootstrap
+
+        values = np.asarray(values, dtype=float)
+        if len(values) < 2 or np.ptp(values) == 0:
+            return cls(float(values.mean()), float(values.min()), float(values.max()))
+        rng = np.random.default_rng(0)
+        interval = bootstrap(
+            (values,), np.mean, n_resamples=RESAMPLES, method="percentile", rng=rng
+        ).confidence_interval
+        return cls(float(values.mean()), float(interval.low), float(interval.high))
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """One row per (policy, lam, episode), as written to evaluation.csv."""
+
+    scenario: Scenario
+    policies: tuple[str, ...]
+    lams: tuple[float, ...]
+    episodes: int
+    seed: int
+    rows: list[dict]
+
+    def values(self, policy: str, lam: float, column: str) -> np.ndarray:
+        """(episodes,) in the order of the seeds, so that two policies' values are pairs."""
+        return np.array([row[column] for row in self.rows if row["policy"] == policy and row["lam"] == lam])
+
+    def summary(self, policy: str, lam: float) -> dict[str, Summary]:
+        """Means with intervals of the quantities in MEANS."""
+        return {column: Summary.of(self.values(policy, lam, column)) for column in MEANS}
+
+    def difference(self, policy: str, reference: str, lam: float, column: str = "return") -> Summary:
+        """Paired difference policy - reference over the common episodes."""
+        return Summary.of(self.values(policy, lam, column) - self.values(reference, lam, column))
+
+    def save(self, out: str | Path) -> None:
+        """Write evaluation.csv and evaluation.json into a folder, each whole or not at all."""
+        out = Path(out)
+        out.mkdir(parents=True, exist_ok=True)
+        with replacing(out / "evaluation.csv") as file:
+            writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(self.rows)
+        means = [
+            {"policy": policy, "lam": lam}
+            | {column: vars(value) for column, value in self.summary(policy, lam).items()}
+            | {"return_difference": vars(self.difference(policy, self.policies[0], lam))}
+            for lam in self.lams
+            for policy in self.policies
+        ]
+        with replacing(out / "evaluation.json") as file:
+            json.dump(self.settings() | {"versions": versions(), "means": means}, file, indent=1)
+
+    def settings(self) -> dict:
+        """What was asked for."""
+        return _settings(self.scenario, self.policies, self.lams, self.episodes, self.seed)
+
+
+def evaluation_seeds(seed: int, episodes: int) -> list[int]:
+    """The literal reset seeds of an evaluation; `gym.make(...).reset(seed=s)` replays episode s."""
+    if not 0 <= seed < 10**4:
+        raise ValueError(f"seed = {seed}: must be in 0..9999")
+    if not 1 <= episodes <= SEEDS_PER_RUN:
+        raise ValueError(f"episodes = {episodes}: must be in 1..{SEEDS_PER_RUN}")
+    return [FIRST_SEED + seed * SEEDS_PER_RUN + episode for episode in range(episodes)]
+
+
+def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict]:
+    """Play one episode for each seed and measure it.
+
+    Args:
+        policy: sees only views.
+        world: of a scenario with one lam.
+        seeds: reset seeds, one a row.
+
+    Returns: the measured columns of each episode.
+    """
+    scenario = world.scenario
+    state = world.reset(np.array([draws.key_of_seed(seed) for seed in seeds], dtype=np.uint64))
+    sums = dict.fromkeys(("error", "square", "energy", "members", "handovers", "searches", "lost"), 0.0)
+    for _ in range(scenario.periods):
+        state, outcome = world.step(state, policy.act(View.of(state)), donate=True)
+        sums["error"] += outcome.error_m
+        sums["square"] += outcome.error_m**2
+        sums["energy"] += outcome.energy_mj
+        sums["members"] += outcome.members
+        sums["handovers"] += outcome.handover
+        sums["searches"] += outcome.searched
+        sums["lost"] += outcome.error_m > 2 * scenario.detection.radius_m
+    n = scenario.periods
+    columns = {
+        "lam": state.lam,
+        "periods": np.full(len(seeds), n),
+        "return": -(sums["error"] + state.lam * sums["energy"]),
+        "error_m": sums["error"] / n,
+        "rms_m": np.sqrt(sums["square"] / n),
+        "energy_mj": sums["energy"] / n,
+        "members": sums["members"] / n,
+        "handovers": sums["handovers"].astype(int),
+        "searches": sums["searches"].astype(int),
+        "lost": sums["lost"].astype(int),
+    }
+    return [{name: values[i].item() for name, values in columns.items()} for i in range(len(seeds))]
+
+
+def evaluate(
+    policies: Sequence[str] | dict[str, Policy],
+    scenario: Scenario,
+    lams: Sequence[float] | None = None,
+    episodes: int = 100,
+    seed: int = 0,
+    keep: str | Path | None = None,
+    progress: Progress | None = None,
+    threads: int | None = None,
+) -> Evaluation:
+    """Paired comparison of policies.
+
+    Args:
+        policies: names (or paths of saved policies), or name -> Policy. The first is the reference of differences.
+        scenario: what they act in.
+        lams: the trade-offs [m/mJ]; None: the scenario's, which must then be a single one.
+        episodes: common random episodes for each policy and lam.
+        seed: another seed, other episodes; training never meets any of them.
+        keep: a folder for finished blocks, so that a stopped run continues; None: none are kept.
+        progress: called with (blocks done, of, what).
+        threads: as World's.
+
+    Raises:
+        ValueError: for an unknown policy, or seed and episodes out of range.
+    """
+    lams = tuple(float(lam) for lam in (lams if lams is not None else [scenario.lam]))
+    named = policies if isinstance(policies, dict) else {name: make_policy(name, scenario) for name in policies}
+    seeds = evaluation_seeds(seed, episodes)
+    blocks = [seeds[i : i + BLOCK] for i in range(0, episodes, BLOCK)]
+    kept = _Kept(keep, _settings(scenario, named, lams, episodes, seed))
+    rows: list[dict] = []
+    done, total = 0, len(lams) * len(named) * len(blocks)
+    for lam in lams:
+        world = World(scenario.override(lam=lam), threads)
+        for name, policy in named.items():
+            for number, block in enumerate(blocks):
+                measured = kept.get(name, lam, number) or kept.put(name, lam, number, rollout(policy, world, block))
+                for i, values in enumerate(measured):
+                    episode = number * BLOCK + i
+                    row = {"policy": name, "scenario": scenario.name, "episode": episode, "seed": block[i], "bound_m": ""}
+                    rows.append({column: (row | values)[column] for column in COLUMNS})
+                done += 1
+                if progress:
+                    progress(done, total, f"{name}, lam {lam:g}")
+    return Evaluation(scenario, tuple(named), lams, episodes, seed, rows)
+
+
+class _Kept:
+    """Finished blocks in a JSON-lines file; one of other settings is not read but begun anew."""
+
+    def __init__(self, folder: str | Path | None, settings: dict):
+        self._blocks: dict[tuple, list[dict]] = {}
+        self._path = None if folder is None else Path(folder) / "evaluation.blocks.jsonl"
+        if self._path is None:
+            return
+        head = hashlib.sha256(json.dumps(settings | {"versions": versions()}, sort_keys=True).encode()).hexdigest()
+        lines = self._path.read_text().splitlines() if self._path.exists() else []
+        if lines and lines[0] == json.dumps(head):
+            for line in lines[1:]:
+                try:
+                    name, lam, number, measured = json.loads(line)
+                except ValueError:
+                    continue  # cut short when the run was killed
+                self._blocks[name, lam, number] = measured
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(self._path) as file:
+            file.write(json.dumps(head) + "\n")
+            for key, measured in self._blocks.items():
+                file.write(json.dumps([*key, measured]) + "\n")
+
+    def get(self, name: str, lam: float, number: int) -> list[dict] | None:
+        return self._blocks.get((name, lam, number))
+
+    def put(self, name: str, lam: float, number: int, measured: list[dict]) -> list[dict]:
+        if self._path is not None:
+            with open(self._path, "a") as file:
+                file.write(json.dumps([name, lam, number, measured]) + "\n")
+        return measured
+
+    @staticmethod
+    def forget(folder: str | Path) -> None:
+        (Path(folder) / "evaluation.blocks.jsonl").unlink(missing_ok=True)
+
+
+def forget_blocks(folder: str | Path) -> None:
+    """Remove the kept blocks of a finished run."""
+    _Kept.forget(folder)
+
+
+class replacing:  # noqa: N801 - a context manager used like open()
+    """Open a file for writing under a temporary name and rename it at the end: whole or not at all."""
+
+    def __init__(self, path: str | Path, mode: str = "w"):
+        self._path = Path(path)
+        self._temporary = self._path.with_name(f".{self._path.name}.{os.getpid()}")
+        self._mode = mode
+
+    def __enter__(self):
+        self._file = open(self._temporary, self._mode, newline="" if "b" not in self._mode else None)
+        return self._file
+
+    def __exit__(self, kind, problem, trace):
+        self._file.close()
+        if kind is None:
+            os.replace(self._temporary, self._path)
+        else:
+            self._temporary.unlink(missing_ok=True)
+
+
+def versions() -> dict[str, str]:
+    """What made a result."""
+    found = {"python": platform.python_version()}
+    for name in ("wsn_env", "numpy", "numba", "gymnasium", "filterpy", "scipy", "stable-baselines3", "torch"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            pass
+    return found
+
+
+def _settings(scenario: Scenario, policies, lams, episodes: int, seed: int) -> dict:
+    return {
+        "scenario": scenario.as_dict(),
+        "policies": list(policies),
+        "lams": list(lams),
+        "episodes": episodes,
+        "seed": seed,
+    }
