@@ -1,0 +1,131 @@
+"""Paired comparison: seeds, rows, intervals, files, stopping and continuing."""
+
+import csv
+import json
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from wsn_env import Scenario, View, make_policy
+from wsn_env.evaluation import BLOCK, COLUMNS, Evaluation, Summary, evaluate, evaluation_seeds
+from wsn_env.reports import draw_front, markdown_table
+
+SCENARIO = Scenario.named("PreDC-v0", particles=60, nodes=40, side_m=50.0, crossing_m=20.0, periods=8)
+
+
+@pytest.fixture(scope="module")
+def evaluation() -> Evaluation:
+    return evaluate(["pre_dc", "nearest0", "all"], SCENARIO, [1.0, 10.0], episodes=BLOCK + 7, seed=3)
+
+
+def test_a_row_replays_in_the_environment(evaluation):
+    """gym.make(...).reset(seed=the row's) and the same policy give the row's figures."""
+    for row in evaluation.rows[:: BLOCK + 3]:
+        env = gym.make(
+            "wsn_env/PreDC-v0", scenario=SCENARIO, lam=row["lam"], action="cluster", observation="view"
+        ).unwrapped
+        policy = make_policy(row["policy"], SCENARIO)
+        observation, _ = env.reset(seed=row["seed"])
+        infos, total = [], 0.0
+        for _ in range(row["periods"]):
+            observation, reward, *_, info = env.step(policy.predict(observation)[0])
+            infos.append(info)
+            total += reward
+        assert row["return"] == pytest.approx(total, rel=1e-12)
+        assert row["error_m"] == pytest.approx(np.mean([info["error_m"] for info in infos]), rel=1e-12)
+        assert row["rms_m"] == pytest.approx(info["episode_rms_m"], rel=1e-12)
+        assert row["energy_mj"] == pytest.approx(np.mean([info["energy_mj"] for info in infos]), rel=1e-12)
+        assert row["members"] == np.mean([info["members"] for info in infos])
+        assert row["handovers"] == sum(info["handover"] for info in infos)
+        assert row["lost"] == sum(info["error_m"] > 20 for info in infos)
+
+
+def test_return_is_made_of_error_and_energy(evaluation):
+    for row in evaluation.rows:
+        assert row["return"] == pytest.approx(-row["periods"] * (row["error_m"] + row["lam"] * row["energy_mj"]))
+        assert row["bound_m"] == ""
+
+
+def test_policies_meet_common_random_numbers():
+    """A policy's rows do not depend on who else is compared, on the number of threads, or on lam but for the return."""
+    alone = evaluate(["nearest0"], SCENARIO, [1.0], episodes=BLOCK + 7, seed=3, threads=1)
+    crowd = evaluate(["all", "nearest0"], SCENARIO, [1.0, 10.0], episodes=BLOCK + 7, seed=3, threads=2)
+    assert [row for row in crowd.rows if row["policy"] == "nearest0" and row["lam"] == 1.0] == alone.rows
+    a, b = (crowd.values("nearest0", lam, "rms_m") for lam in (1.0, 10.0))
+    assert (a == b).all()
+
+
+def test_seeds_never_meet_training():
+    assert evaluation_seeds(0, 3) == [2**31, 2**31 + 1, 2**31 + 2]
+    assert evaluation_seeds(2, 1) == [2**31 + 200_000]
+    assert not set(evaluation_seeds(0, 100_000)) & set(evaluation_seeds(1, 100_000))
+    for seed, episodes in ((-1, 1), (0, 0), (0, 100_001), (10_000, 1)):
+        with pytest.raises(ValueError, match="must be in"):
+            evaluation_seeds(seed, episodes)
+
+
+def test_bootstrap_intervals_cover_and_pairs_narrow():
+    rng = np.random.default_rng(1)
+    covered = 0
+    for _ in range(200):
+        s = Summary.of(rng.normal(3.0, 2.0, 100))
+        assert s.low < s.mean < s.high
+        covered += s.low <= 3.0 <= s.high
+    assert 180 <= covered <= 199  # 95 % of 200, within four standard errors
+    assert Summary.of([2.0]) == Summary(2.0, 2.0, 2.0)
+
+
+def test_files_hold_rows_and_settings(evaluation, tmp_path):
+    evaluation.save(tmp_path)
+    with open(tmp_path / "evaluation.csv") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == list(COLUMNS) and len(rows) == 2 * 3 * (BLOCK + 7)
+    assert [float(row["return"]) for row in rows] == [row["return"] for row in evaluation.rows]
+    saved = json.loads((tmp_path / "evaluation.json").read_text())
+    assert saved["scenario"]["field"]["nodes"] == 40 and saved["seed"] == 3 and "numba" in saved["versions"]
+    assert len(saved["means"]) == 6
+    one = next(m for m in saved["means"] if m["policy"] == "nearest0" and m["lam"] == 10.0)
+    difference = evaluation.values("nearest0", 10.0, "return") - evaluation.values("pre_dc", 10.0, "return")
+    assert one["return_difference"]["mean"] == pytest.approx(difference.mean())
+
+
+def test_a_stopped_run_continues_where_it_was(tmp_path, monkeypatch):
+    whole = evaluate(["nearest0", "nearest1"], SCENARIO, [1.0], episodes=2 * BLOCK)
+
+    def stop(done, total, text):
+        if done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        evaluate(["nearest0", "nearest1"], SCENARIO, [1.0], episodes=2 * BLOCK, keep=tmp_path, progress=stop)
+    blocks = tmp_path / "evaluation.blocks.jsonl"
+    with open(blocks, "a") as file:
+        file.write('["nearest1", 1.0, 1, [{"lam": 1.0, "peri')  # as kill -9 leaves it
+    played = []
+    import wsn_env.evaluation as module
+
+    rollout = module.rollout
+    monkeypatch.setattr(module, "rollout", lambda *a: played.append(1) or rollout(*a))
+    continued = evaluate(["nearest0", "nearest1"], SCENARIO, [1.0], episodes=2 * BLOCK, keep=tmp_path)
+    assert continued.rows == whole.rows and len(played) == 1
+    other = evaluate(["nearest0", "nearest1"], SCENARIO, [1.0], episodes=2 * BLOCK, seed=1, keep=tmp_path)
+    assert len(played) == 5 and other.rows != whole.rows
+
+
+def test_tables_and_picture(evaluation, tmp_path):
+    table = markdown_table(evaluation, 10.0, "pre_dc").splitlines()
+    returns = [float(line.split("|")[2].split()[0]) for line in table[2:]]
+    assert returns == sorted(returns, reverse=True) and len(returns) == 3
+    draw_front(evaluation, 10.0, tmp_path / "front.png", emphasis="nearest0")
+    assert (tmp_path / "front.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_a_policy_of_ones_own_needs_no_name():
+    class Lonely:
+        def act(self, view: View):
+            return make_policy("nearest0", SCENARIO).act(view)
+
+    evaluation = evaluate({"mine": Lonely(), "nearest0": make_policy("nearest0", SCENARIO)}, SCENARIO, [2.0], episodes=3)
+    assert (evaluation.values("mine", 2.0, "return") == evaluation.values("nearest0", 2.0, "return")).all()
+    assert evaluation.difference("mine", "nearest0", 2.0) == Summary(0.0, 0.0, 0.0)

@@ -1,0 +1,120 @@
+"""train.py end to end in a short form: files, resume, damaged files, the saved policy without torch."""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+import train
+from agents.network import Network
+from agents.ppo import PPOPolicy, network_of
+from wsn_env import ClusterVectorEnv, Scenario, View, make_policy
+
+SET = ["particles=50", "nodes=40", "side_m=50", "crossing_m=20", "periods=10"]
+SHORT = dict(steps=4096, rows=32, rollout=32, batch=512, epochs=2, episodes=60, checkpoint_steps=1024, set=SET)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory) -> Path:
+    runs = tmp_path_factory.mktemp("runs")
+    train.train(train.Training(name="short", runs=runs, **SHORT))
+    return runs / "short"
+
+
+def test_a_run_leaves_its_files(run):
+    for name in "config.json policy.json policy.safetensors checkpoint.zip evaluation.csv evaluation.json comparison.png".split():
+        assert (run / name).stat().st_size > 0, name
+    progress = next(run.glob("progress-*"))
+    assert (progress / "progress.csv").exists() and list(progress.glob("events.out.tfevents.*"))
+    assert not [path.name for path in run.iterdir() if path.name.startswith(".")]
+    means = json.loads((run / "evaluation.json").read_text())["means"]
+    assert {"ppo", "pre_dc", "centroid", "static_cluster", "nearest0", "nearest8"} <= {m["policy"] for m in means}
+
+
+def test_the_saved_policy_is_the_trained_one_without_torch(run):
+    """NumPy's logits are torch's; the file opens in a process that never imports torch."""
+    from stable_baselines3 import PPO
+
+    model = PPO.load(run / "checkpoint.zip")
+    network = Network.load(run / "policy.safetensors")
+    assert all(np.array_equal(a, b) for x, y in zip(network.layers, network_of(model).layers) for a, b in zip(x, y))
+    scenario = Scenario.named("PreDC-v0", **train.parse_overrides(SET))
+    envs = ClusterVectorEnv(16, scenario)
+    observation, _ = envs.reset(seed=0)
+    with torch.no_grad():
+        wanted = model.policy.get_distribution(torch.as_tensor(observation)).distribution.logits.numpy()
+    ours = network.logits(observation)
+    assert np.allclose(ours - ours.max(1, keepdims=True), wanted - wanted.max(1, keepdims=True), atol=1e-5)
+    assert (ours == np.concatenate([network.logits(observation[i : i + 1]) for i in range(16)])).all()
+    code = (
+        "import sys\nfrom wsn_env.cli import main\n"
+        f"main(['evaluate', '--policies', 'nearest1', {str(run)!r}, '--episodes', '3', '--set', *{SET!r}])\n"
+        "assert 'torch' not in sys.modules and 'stable_baselines3' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
+def test_resume_continues_and_guards(run, tmp_path):
+    runs = tmp_path / "runs"
+    shutil.copytree(run, runs / "short")
+    settings = dict(name="short", runs=runs) | SHORT
+    with pytest.raises(ValueError, match="--resume"):
+        train.train(train.Training(**settings))
+    with pytest.raises(ValueError, match="learning_rate"):
+        train.train(train.Training(**settings, resume=True, learning_rate=1.0))
+    before = (runs / "short" / "policy.safetensors").read_bytes()
+    train.train(train.Training(**settings, resume=True))  # all steps are done: only compares
+    assert (runs / "short" / "policy.safetensors").read_bytes() == before
+
+
+def test_a_stopped_training_goes_on(tmp_path, monkeypatch):
+    settings = dict(name="stopped", runs=tmp_path) | SHORT | dict(episodes=0)
+    real = train.Watch._on_rollout_end
+
+    def stop(self):
+        real(self)
+        if self.num_timesteps >= 2048:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(train.Watch, "_on_rollout_end", stop)
+    with pytest.raises(KeyboardInterrupt):
+        train.train(train.Training(**settings))
+    monkeypatch.setattr(train.Watch, "_on_rollout_end", real)
+    train.train(train.Training(**settings, resume=True))
+    steps = sorted(int(path.name.split("-")[1]) for path in (tmp_path / "stopped").glob("progress-*"))
+    assert steps == [0, 2048]
+    assert json.loads((tmp_path / "stopped" / "policy.json").read_text())["training"]["steps"] == 4096
+
+
+def test_damaged_files_say_so(run, tmp_path):
+    runs = tmp_path / "runs"
+    shutil.copytree(run, runs / "short")
+    checkpoint = runs / "short" / "checkpoint.zip"
+    checkpoint.write_bytes(checkpoint.read_bytes()[: checkpoint.stat().st_size // 2])
+    with pytest.raises(ValueError, match="cut short"):
+        train.train(train.Training(name="short", runs=runs, resume=True, **SHORT))
+    scenario = Scenario.named("PreDC-v0", **train.parse_overrides(SET))
+    weights = runs / "short" / "policy.safetensors"
+    weights.write_bytes(weights.read_bytes()[:-100])
+    view = View.of(ClusterVectorEnv(2, scenario).world.reset([0, 1]))
+    with pytest.raises(ValueError, match="cut short"):
+        make_policy(str(runs / "short"), scenario).act(view)
+    saved = runs / "short" / "policy.json"
+    saved.write_text(saved.read_text()[:50])
+    with pytest.raises(ValueError, match="not a saved policy"):
+        make_policy(str(saved), scenario)
+    with pytest.raises(ValueError, match="is not a saved policy"):
+        PPOPolicy(scenario, path=str(tmp_path / "none.json")).act(view)
+
+
+def test_help_explains_every_setting():
+    answer = subprocess.run([sys.executable, train.__file__, "--help"], capture_output=True, text=True, check=True)
+    for name in train.Training.__dataclass_fields__:
+        assert f"--{name.replace('_', '-')}" in answer.stdout
+    bad = subprocess.run([sys.executable, train.__file__, "--lam", "-3"], capture_output=True, text=True)
+    assert bad.returncode == 2 and "lam" in bad.stderr and bad.stderr.count("\n") == 1
