@@ -16,9 +16,9 @@ train: $(READY)
 test: $(READY)
 	$(RUN) -m pytest
 
-# Long studies; SHORT=1 runs their short form.
+# The studies that `make test` leaves out, a few minutes.
 slow: $(READY)
-	WSN_SHORT=$(SHORT) $(RUN) -m pytest -m slow
+	$(RUN) -m pytest -m slow
 
 bench: $(READY)
 	$(RUN) -m benchmarks.environment

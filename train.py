@@ -22,12 +22,13 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecMonitor
 
-from agents.ppo import network_of, save_policy
+from agents.ppo import PPOPolicy, network_of, save_policy
 from agents.sb3 import SB3VecEnv
-from wsn_env.cli import parse_overrides, progress_bar
+from wsn_env.cli import parse_overrides
 from wsn_env.evaluation import evaluate, forget_blocks, replacing, versions
 from wsn_env.interface import Settings
-from wsn_env.policies import policy_names
+from wsn_env.policies import make_policy, policy_names
+from wsn_env.progress import progress_bar
 from wsn_env.reports import draw_front, print_tables
 from wsn_env.scenario import Scenario
 from wsn_env.vector_env import ClusterVectorEnv
@@ -247,9 +248,6 @@ class Watch(BaseCallback):
 
 def compare(settings: Training, scenario: Scenario, policy: Path) -> None:
     """Paired comparison with every baseline at the trained lam: table, CSV, JSON, picture."""
-    from agents.ppo import PPOPolicy
-    from wsn_env.policies import make_policy
-
     folder = settings.folder
     policies = {"ppo": PPOPolicy(scenario, path=str(policy))}
     policies |= {name: make_policy(name, scenario) for name in policy_names() if name != "ppo"}

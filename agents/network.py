@@ -1,4 +1,4 @@
-"""A small dense network, read from safetensors and run row by row in a fixed order: no torch, the same bits in any batch."""
+"""A small dense network from safetensors, run row by row in a fixed order: no torch, the same bits in any batch."""
 
 from __future__ import annotations
 

@@ -32,9 +32,7 @@ class PreDC(ViewPolicy):
         standing = joint_detection_probability(np.where(view.member, p, 0.0))
         keep = (view.spread_m < self.phi0_m) & (standing >= self.theta) & (view.head >= 0)
         head, chosen = self._form(view, p)
-        return Cluster.of(
-            np.where(keep, view.head, head), np.where(keep[:, None], view.member, chosen)
-        )
+        return Cluster.of(np.where(keep, view.head, head), np.where(keep[:, None], view.member, chosen))
 
     def _form(self, view: View, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Heads (B,) and members (B, S) of new clusters."""

@@ -15,7 +15,8 @@ from wsn_env.vector_env import ClusterVectorEnv
 class SB3VecEnv(VecEnv):
     """Steps all rows at once, bit-identical to a DummyVecEnv of single environments.
 
-    Infos are filled for rows that end (their last info, terminal_observation, TimeLimit.truncated); the others' are empty.
+    Infos are filled for rows that end (their last info, terminal_observation, TimeLimit.truncated); the others' are
+    empty.
 
     Args:
         envs: in same-step or disabled autoreset mode. Next-step's extra reset row is no transition: it is refused.

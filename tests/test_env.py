@@ -58,7 +58,9 @@ def test_found_without_importing_wsn_env_first():
 
 
 def test_import_is_light():
-    code = "import wsn_env, sys; print(sorted({'torch', 'matplotlib', 'numba', 'scipy', 'filterpy'} & set(sys.modules)))"
+    code = (
+        "import wsn_env, sys; print(sorted({'torch', 'matplotlib', 'numba', 'scipy', 'filterpy'} & set(sys.modules)))"
+    )
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert answer.stdout.strip() == "[]"
 
@@ -120,9 +122,16 @@ def test_reward_is_minus_error_and_energy():
 
 
 def test_belief_reward_turns_to_the_error_when_the_belief_is_wrong():
-    env = ClusterEnv(reward="belief", lam=0.0, search=False, filter_q=0.0, motion="turns", speed_ms=3.0, **{
-        k: v for k, v in SMALL.items() if k not in ("crossing_m", "periods")
-    }, periods=30)
+    env = ClusterEnv(
+        reward="belief",
+        lam=0.0,
+        search=False,
+        filter_q=0.0,
+        motion="turns",
+        speed_ms=3.0,
+        **{k: v for k, v in SMALL.items() if k not in ("crossing_m", "periods")},
+        periods=30,
+    )
     env.reset(seed=0)
     kinds = set()
     for _ in range(30):
@@ -227,7 +236,9 @@ def test_bad_keywords_name_themselves(keywords, words):
     assert all(word in str(problem.value) for word in words)
 
 
-@pytest.mark.parametrize("action,bad", [("menu", 19), ("menu", -1), ("subset", np.full(13, 2)), ("nodes", np.zeros(3, int))])
+@pytest.mark.parametrize(
+    "action,bad", [("menu", 19), ("menu", -1), ("subset", np.full(13, 2)), ("nodes", np.zeros(3, int))]
+)
 def test_bad_actions_name_the_space(action, bad):
     env = ClusterEnv(action=action, **SMALL)
     env.reset(seed=0)

@@ -126,6 +126,8 @@ def test_a_policy_of_ones_own_needs_no_name():
         def act(self, view: View):
             return make_policy("nearest0", SCENARIO).act(view)
 
-    evaluation = evaluate({"mine": Lonely(), "nearest0": make_policy("nearest0", SCENARIO)}, SCENARIO, [2.0], episodes=3)
+    evaluation = evaluate(
+        {"mine": Lonely(), "nearest0": make_policy("nearest0", SCENARIO)}, SCENARIO, [2.0], episodes=3
+    )
     assert (evaluation.values("mine", 2.0, "return") == evaluation.values("nearest0", 2.0, "return")).all()
     assert evaluation.difference("mine", "nearest0", 2.0) == Summary(0.0, 0.0, 0.0)

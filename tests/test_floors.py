@@ -11,12 +11,15 @@ FLOORS = {
     "wsn_env.compiling": 0,
     "wsn_env.types": 0,
     "wsn_env.registration": 0,
+    "wsn_env.progress": 0,
     "wsn_env.scenario": 1,
     "wsn_env.numerics": 1,
     "wsn_env.draws": 1,
     "wsn_env.physics": 2,
     "wsn_env.trackers": 3,
     "wsn_env.view": 3,
+    "wsn_env.episode": 3,
+    "wsn_env.period": 3,
     "wsn_env.world": 4,
     "wsn_env.policies": 4,
     "wsn_env.interface": 5,
@@ -73,7 +76,9 @@ def test_every_file_has_a_place():
     assert all(any(m == name or m.startswith(f"{name}.") for m in modules) for name in FLOORS)
 
 
-@pytest.mark.parametrize("path", [p for p in FILES if "physics" in p.parts or p.stem in ("world", "view", "types")], ids=module_of)
+@pytest.mark.parametrize(
+    "path", [p for p in FILES if "physics" in p.parts or p.stem in ("world", "view", "types")], ids=module_of
+)
 def test_nobody_below_the_interface_knows_gymnasium_or_sb3(path):
     text = path.read_text()
     assert "import gymnasium" not in text and "stable_baselines3" not in text

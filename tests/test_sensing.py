@@ -61,7 +61,7 @@ def test_joint_detection_probability():
 def measured(cs, target, positions, count):
     out = np.empty((count, 2))
     for i in range(count):
-        sensing.measure(np.uint64(1), i, 0, positions, target, cs[0], out[i])
+        sensing.measure(np.uint64(1), i, 0, positions, (target[0], target[2]), cs[0], out[i])
     return out
 
 

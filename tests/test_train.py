@@ -27,7 +27,8 @@ def run(tmp_path_factory) -> Path:
 
 
 def test_a_run_leaves_its_files(run):
-    for name in "config.json policy.json policy.safetensors checkpoint.zip evaluation.csv evaluation.json comparison.png".split():
+    files = "config.json policy.json policy.safetensors checkpoint.zip evaluation.csv evaluation.json comparison.png"
+    for name in files.split():
         assert (run / name).stat().st_size > 0, name
     progress = next(run.glob("progress-*"))
     assert (progress / "progress.csv").exists() and list(progress.glob("events.out.tfevents.*"))

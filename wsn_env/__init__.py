@@ -1,8 +1,8 @@
 """wsn_env: wireless sensor networks that track a moving target, as Gymnasium environments.
 
-    import gymnasium as gym, wsn_env
-    env = gym.make("wsn_env/PreDC-v0", lam=4.0)
-    envs = gym.make_vec("wsn_env/PreDC-v0", num_envs=64, vectorization_mode="vector_entry_point")
+import gymnasium as gym, wsn_env
+env = gym.make("wsn_env/PreDC-v0", lam=4.0)
+envs = gym.make_vec("wsn_env/PreDC-v0", num_envs=64, vectorization_mode="vector_entry_point")
 """
 
 import importlib

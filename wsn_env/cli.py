@@ -9,7 +9,7 @@ from typing import Annotated
 
 import tyro
 
-from wsn_env.policies import policy_names
+from wsn_env.progress import progress_bar
 from wsn_env.scenario import Scenario
 
 
@@ -19,9 +19,7 @@ class Evaluate:
 
     scenario: str = "PreDC-v0"
     """Scenario id."""
-    policies: list[str] = field(
-        default_factory=lambda: ["pre_dc", "centroid", "static_cluster"]
-    )
+    policies: list[str] = field(default_factory=lambda: ["pre_dc", "centroid", "static_cluster"])
     """Policies by name, or paths of a saved policy.json; the first is the reference of the differences."""
     lam: list[float] | None = None
     """Trade-offs between error and energy [m/mJ]; left out: the scenario's."""
@@ -116,35 +114,3 @@ def parse_overrides(pairs: list[str]) -> dict:
                     continue
         overrides[name] = value
     return overrides
-
-
-class progress_bar:  # noqa: N801 - a context manager used like open()
-    """A rich progress bar on stderr; gives a function (done, total, text)."""
-
-    def __enter__(self):
-        from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-        self._bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeRemainingColumn(),
-            console=Console(stderr=True),
-            transient=True,
-        )
-        self._bar.start()
-        task = self._bar.add_task("", total=None)
-
-        def report(done: int, total: int, text: str) -> None:
-            self._bar.update(task, completed=done, total=total, description=text)
-
-        return report
-
-    def __exit__(self, *problem):
-        self._bar.stop()
-
-
-def known_policies() -> str:
-    """For help texts."""
-    return ", ".join(policy_names())

@@ -1,5 +1,8 @@
 """How kernels are compiled: `kernel` for what Python calls, `piece` for what kernels are made of.
 
+`lean_kernel` and `lean_piece` do without Numba's reference counts, an atomic operation for every row of an array taken,
+which cost more than a period's physics. They must allocate nothing: Numba raises "NRT required" where one does.
+
 Strict by construction: no fastmath, no BLAS, no libm. The GIL is released, so that `over_rows` can share a
 batch among threads; rows never meet, so the number of threads cannot change a bit.
 """
@@ -17,13 +20,22 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile
 PACKAGE = Path(__file__).parent
 SERIAL_ROWS = 8  # up to here one thread is faster than handing work out
 
-piece = numba.njit(error_model="numpy", nogil=True)
+piece = numba.njit(error_model="numpy", nogil=True, _nrt=True)
+lean_piece = numba.njit(error_model="numpy", nogil=True, _nrt=False)
 
 
 def kernel(function):
     """Compile a function for Python to call, cached on disk."""
-    dispatcher = piece(function)
-    dispatcher._cache = _PackageCache(function)
+    return _cached(piece(function))
+
+
+def lean_kernel(function):
+    """A kernel of lean pieces only."""
+    return _cached(lean_piece(function))
+
+
+def _cached(dispatcher):
+    dispatcher._cache = _PackageCache(dispatcher.py_func)
     return dispatcher
 
 

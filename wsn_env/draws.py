@@ -12,7 +12,7 @@ import numpy as np
 from numba import int32, uint64
 
 from wsn_env.compiling import kernel, piece
-from wsn_env.numerics import F, HALF_PI, f32_bits, f32_from_bits, log, log32, sincos
+from wsn_env.numerics import HALF_PI, F, f32_bits, f32_from_bits, log, log32, sincos
 
 # Purposes, one a use: adding one changes no other draw.
 FIELD, START, TRACK, LAM, DETECTION, MEASUREMENT, PACKET, PROCESS, RESAMPLING, RESTART, POLICY, CLOUD = range(12)

@@ -26,11 +26,13 @@ def resolve(scenario: str | Scenario, overrides: dict[str, Any]) -> Scenario:
 
 def measures(outcome: Outcome, state: State, reward: np.ndarray) -> dict[str, np.ndarray]:
     """The info of a period, (B, ...) each. It carries truth: for loggers only, never for policies."""
+    energy_mj = outcome.energy_mj
+    cost = state.lam * energy_mj
     return {
         "error_m": outcome.error_m,
-        "energy_mj": outcome.energy_mj,
-        "reward_error": reward + state.lam * outcome.energy_mj,
-        "reward_energy": -state.lam * outcome.energy_mj,
+        "energy_mj": energy_mj,
+        "reward_error": reward + cost,
+        "reward_energy": -cost,
         "members": outcome.members,
         "delivered": outcome.delivered,
         "dropped": outcome.dropped,

@@ -1,8 +1,8 @@
 """Comparison of policies: paired rollouts over common seeds, intervals, tables, files.
 
-Every policy meets the same fields, tracks, detections and noises, so that differences are taken episode by episode. Work
-goes in blocks of 50 seeds, whatever the machine: the rows are the same to the byte. Finished blocks are kept beside the
-result, and a run that was stopped continues from them.
+Every policy meets the same fields, tracks, detections and noises, so that differences are taken episode by episode.
+Work goes in blocks of 50 seeds, whatever the machine: the rows are the same to the byte. Finished blocks are kept
+beside the result, and a run that was stopped continues from them.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import hashlib
 import json
 import os
 import platform
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -21,7 +21,9 @@ import numpy as np
 
 from wsn_env import draws
 from wsn_env.policies import Policy, make_policy
+from wsn_env.progress import Progress
 from wsn_env.scenario import Scenario
+from wsn_env.types import Outcome, State
 from wsn_env.view import View
 from wsn_env.world import World
 
@@ -32,8 +34,6 @@ COLUMNS = (
 ).split()
 MEANS = ("return", "rms_m", "error_m", "energy_mj", "members", "handovers", "searches", "lost")
 RESAMPLES = 2000
-
-Progress = Callable[[int, int, str], None]
 
 
 @dataclass(frozen=True)
@@ -114,6 +114,14 @@ def evaluation_seeds(seed: int, episodes: int) -> list[int]:
     return [FIRST_SEED + seed * SEEDS_PER_RUN + episode for episode in range(episodes)]
 
 
+def episodes(policy: Policy, world: World, seeds: Sequence[int]) -> Iterator[tuple[State, Outcome]]:
+    """Play one episode for each seed, a row each; gives state and outcome after every period."""
+    state = world.reset(np.array([draws.key_of_seed(seed) for seed in seeds], dtype=np.uint64))
+    for _ in range(world.scenario.periods):
+        state, outcome = world.step(state, policy.act(View.of(state)), donate=True)
+        yield state, outcome
+
+
 def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict]:
     """Play one episode for each seed and measure it.
 
@@ -125,10 +133,8 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict]:
     Returns: the measured columns of each episode.
     """
     scenario = world.scenario
-    state = world.reset(np.array([draws.key_of_seed(seed) for seed in seeds], dtype=np.uint64))
     sums = dict.fromkeys(("error", "square", "energy", "members", "handovers", "searches", "lost"), 0.0)
-    for _ in range(scenario.periods):
-        state, outcome = world.step(state, policy.act(View.of(state)), donate=True)
+    for state, outcome in episodes(policy, world, seeds):  # noqa: B007 - lam is read from the last
         sums["error"] += outcome.error_m
         sums["square"] += outcome.error_m**2
         sums["energy"] += outcome.energy_mj
@@ -188,10 +194,18 @@ def evaluate(
         world = World(scenario.override(lam=lam), threads)
         for name, policy in named.items():
             for number, block in enumerate(blocks):
-                measured = kept.get(name, lam, number) or kept.put(name, lam, number, rollout(policy, world, block))
+                measured = kept.get(name, lam, number)
+                if measured is None:
+                    measured = kept.put(name, lam, number, rollout(policy, world, block))
                 for i, values in enumerate(measured):
                     episode = number * BLOCK + i
-                    row = {"policy": name, "scenario": scenario.name, "episode": episode, "seed": block[i], "bound_m": ""}
+                    row = {
+                        "policy": name,
+                        "scenario": scenario.name,
+                        "episode": episode,
+                        "seed": block[i],
+                        "bound_m": "",
+                    }
                     rows.append({column: (row | values)[column] for column in COLUMNS})
                 done += 1
                 if progress:

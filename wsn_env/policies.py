@@ -1,7 +1,7 @@
 """Policies by name, from every installed package's entry points in the group `wsn_env.policies`.
 
-A package of one's own adds `my_rule = "my_package.rules:MyRule"` there: a callable that takes the Scenario and returns an
-object with `act(view) -> Cluster`.
+A package of one's own adds `my_rule = "my_package.rules:MyRule"` there: a callable that takes the Scenario and returns
+an object with `act(view) -> Cluster`.
 """
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from wsn_env.evaluation import Evaluation, replacing
 
+EMPHASIS, FAMILY, OTHER = "#D55E00", "#0072B2", "#333333"
 HEADER = ("policy", "return", "difference to {}", "RMS m", "energy mJ/period", "awake", "lost")
 
 
@@ -65,7 +66,9 @@ def markdown_table(evaluation: Evaluation, lam: float, reference: str) -> str:
 
 
 def draw_front(evaluation: Evaluation, lam: float, path: str | Path, emphasis: str | None = None) -> None:
-    """Picture of RMS against energy with intervals, and the line of equal return through the emphasised policy.
+    """Picture of mean error against energy with intervals, and the curve of equal return through one policy.
+
+    Policies that differ by a number at the end of their names are joined by a line, and labelled by the number.
 
     Args:
         path: a PNG file.
@@ -76,35 +79,51 @@ def draw_front(evaluation: Evaluation, lam: float, path: str | Path, emphasis: s
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(figsize=(7.5, 5), layout="constrained")
+    figure, axes = plt.subplots(figsize=(8, 5.2), layout="constrained")
+    points = {}
     for policy in evaluation.policies:
         s = evaluation.summary(policy, lam)
-        x, y = s["energy_mj"], s["error_m"]
-        strong = policy == emphasis
-        axes.errorbar(
-            x.mean,
-            y.mean,
-            xerr=[[x.mean - x.low], [x.high - x.mean]],
-            yerr=[[y.mean - y.low], [y.high - y.mean]],
-            fmt="*" if strong else "o",
-            markersize=14 if strong else 5,
-            color="#D55E00" if strong else "#0072B2",
-            zorder=3 if strong else 2,
-        )
-        axes.annotate(policy, (x.mean, y.mean), xytext=(6, 5), textcoords="offset points", fontsize=9)
+        points[policy] = s["energy_mj"], s["error_m"]
+        _draw_point(axes, policy, *points[policy], strong=policy == emphasis)
+    for stem in {_stem(policy) for policy in points} - set(points):
+        family = sorted((points[policy][0].mean, points[policy][1].mean) for policy in points if _stem(policy) == stem)
+        axes.plot(*zip(*family), color=FAMILY, linewidth=1, label=f"{stem}0, 1, ...", zorder=1)
+    axes.set_xscale("log")
     if emphasis is not None:
-        s = evaluation.summary(emphasis, lam)
-        lowest, highest = axes.get_xlim()
-        cost = s["error_m"].mean + lam * s["energy_mj"].mean
-        ends = [max(lowest, 0.0), min(highest, cost / lam if lam else highest)]
-        limits = axes.get_ylim()
-        axes.plot(ends, [cost - lam * x for x in ends], "--", color="#888888", zorder=1, label="equal return")
-        axes.set_ylim(limits)
-        axes.legend(frameon=False)
+        energy, error = points[emphasis]
+        limits = axes.axis()
+        cost = error.mean + lam * energy.mean
+        xs = [limits[0] * (limits[1] / limits[0]) ** (i / 200) for i in range(201)]
+        ys = [cost - lam * x for x in xs]
+        axes.plot(xs, ys, "--", color="#888888", linewidth=1, label=f"return of {emphasis}", zorder=1)
+        axes.axis(limits)
+    axes.legend(frameon=False)
     axes.set_xlabel("energy [mJ per period]")
     axes.set_ylabel("mean error [m]")
-    axes.set_title(f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} episodes")
+    axes.set_title(f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes")
     axes.grid(alpha=0.3)
     with replacing(path, "wb") as file:
         figure.savefig(file, dpi=140, format="png")
     plt.close(figure)
+
+
+def _stem(policy: str) -> str:
+    return policy.rstrip("0123456789")
+
+
+def _draw_point(axes, policy: str, energy, error, strong: bool) -> None:
+    numbered = _stem(policy) != policy
+    colour = EMPHASIS if strong else FAMILY if numbered else OTHER
+    axes.errorbar(
+        energy.mean,
+        error.mean,
+        xerr=[[energy.mean - energy.low], [energy.high - energy.mean]],
+        yerr=[[error.mean - error.low], [error.high - error.mean]],
+        fmt="*" if strong else "o",
+        markersize=15 if strong else 5,
+        color=colour,
+        zorder=3 if strong else 2,
+    )
+    label = policy.removeprefix(_stem(policy)) if numbered else policy
+    place = (-11, -11) if numbered else (7, 5)
+    axes.annotate(label, (energy.mean, error.mean), xytext=place, textcoords="offset points", fontsize=9, color=colour)

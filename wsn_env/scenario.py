@@ -23,9 +23,7 @@ class ScenarioError(ValueError):
 
 def quantity(default, meaning, *, above=None, at_least=None, at_most=None, whole=False, choices=None, optional=False):
     """A field with its meaning (shown by --help) and what is allowed."""
-    allowed = dict(
-        above=above, at_least=at_least, at_most=at_most, whole=whole, choices=choices, optional=optional
-    )
+    allowed = dict(above=above, at_least=at_least, at_most=at_most, whole=whole, choices=choices, optional=optional)
     return field(default=default, metadata={"meaning": meaning, "allowed": allowed})
 
 
@@ -76,13 +74,19 @@ class Field(Section):
     nodes: int = quantity(225, "number of sensor nodes S", at_least=1, whole=True)
     side_m: float = quantity(100.0, "side of the square field", above=0, at_most=100_000)
     field_seed: int | None = quantity(
-        None, "one fixed field drawn from this seed; None: a new one each episode", at_least=0, whole=True, optional=True
+        None,
+        "one fixed field drawn from this seed; None: a new one each episode",
+        at_least=0,
+        whole=True,
+        optional=True,
     )
     positions: tuple[tuple[float, float], ...] | None = None  # m; given nodes instead of drawn ones
 
     def __post_init__(self):
         super().__post_init__()
         if self.positions is not None:
+            if self.field_seed is not None:
+                raise ScenarioError(f"Field.field_seed = {self.field_seed}: must be None where positions are given")
             try:
                 array = np.asarray(self.positions, dtype=float)
             except (TypeError, ValueError):
@@ -90,7 +94,9 @@ class Field(Section):
             if array.ndim != 2 or array.shape[1] != 2 or not len(array) or not np.isfinite(array).all():
                 raise ScenarioError(f"Field.positions has shape {array.shape}: must be finite pairs (x, y) in m")
             if array.min() < 0 or array.max() > self.side_m:
-                raise ScenarioError(f"Field.positions spans {array.min()}..{array.max()}: must lie in 0..{self.side_m} m")
+                raise ScenarioError(
+                    f"Field.positions spans {array.min()}..{array.max()}: must lie in 0..{self.side_m} m"
+                )
             if self.nodes not in (type(self).nodes, len(array)):
                 raise ScenarioError(f"Field.nodes = {self.nodes}: must be {len(array)}, as many as there are positions")
             object.__setattr__(self, "positions", tuple(map(tuple, array.tolist())))
@@ -269,7 +275,9 @@ class Radio(Section):
     wakeup_bits: int = quantity(128, "the wake-up of a search, paid by its receivers", at_least=0, whole=True)
     broadcast_bits: int = quantity(32, "the head's word to resample", at_least=0, whole=True)
     handover: str = quantity(
-        "estimate", "what is handed over: the estimate (handover_bits) or every particle", choices=("estimate", "particles")
+        "estimate",
+        "what is handed over: the estimate (handover_bits) or every particle",
+        choices=("estimate", "particles"),
     )
     packet_success: float = quantity(1.0, "probability that one try of a report arrives", at_least=0, at_most=1)
     retries: int = quantity(3, "further tries of a lost report", at_least=0, at_most=15, whole=True)
@@ -411,7 +419,9 @@ class Scenario(Section):
         flat = {}
         for item in fields(self):
             value = getattr(self, item.name)
-            flat |= {f.name: getattr(value, f.name) for f in fields(value)} if is_dataclass(value) else {item.name: value}
+            flat |= (
+                {f.name: getattr(value, f.name) for f in fields(value)} if is_dataclass(value) else {item.name: value}
+            )
         return flat
 
     def as_dict(self) -> dict[str, Any]:
@@ -420,7 +430,9 @@ class Scenario(Section):
         for item in fields(self):
             value = getattr(self, item.name)
             if is_dataclass(value):
-                plain[item.name] = {"kind": type(value).__name__} | {f.name: getattr(value, f.name) for f in fields(value)}
+                plain[item.name] = {"kind": type(value).__name__} | {
+                    f.name: getattr(value, f.name) for f in fields(value)
+                }
             else:
                 plain[item.name] = value
         return plain

@@ -57,7 +57,42 @@ class State(NamedTuple):
 
     @property
     def rows(self) -> int:
+        """B."""
         return len(self.key)
+
+    @classmethod
+    def zeros(cls, rows: int, nodes: int, periods: int, particles: int) -> State:
+        """Of the right shapes, before an episode begins."""
+        network = Network(
+            positions=np.zeros((rows, nodes, 2)),
+            battery=np.zeros((rows, nodes)),
+            alive=np.zeros(rows, np.int64),
+            head=np.zeros(rows, np.int64),
+            members=np.zeros((rows, nodes), np.int32),
+            n_members=np.zeros(rows, np.int64),
+        )
+        reports = Reports(np.zeros(rows, np.int64), np.zeros((rows, nodes), np.int32), np.zeros((rows, nodes, 2)))
+        belief = Belief(
+            mean=np.zeros((rows, 4)),
+            cov=np.zeros((rows, 4, 4)),
+            predicted_mean=np.zeros((rows, 4)),
+            predicted_cov=np.zeros((rows, 4, 4)),
+            n_eff=np.zeros(rows),
+            particles=np.zeros((rows, 4, particles), np.float32),
+            log_weights=np.zeros((rows, particles), np.float32),
+        )
+        return cls(
+            key=np.zeros(rows, np.uint64),
+            period=np.zeros(rows, np.int64),
+            lam=np.zeros(rows),
+            track=np.zeros((rows, periods + 1, 4)),
+            log_miss=np.zeros(rows),
+            last_search=np.zeros(rows, np.int64),
+            luck=np.zeros(rows, np.uint32),
+            network=network,
+            reports=reports,
+            belief=belief,
+        )
 
     def copy(self) -> State:
         """A deep copy: no array is shared."""
@@ -97,7 +132,7 @@ class Outcome(NamedTuple):
     error_m: np.ndarray  # distance between the estimate and the target after the correction
     energy_j: np.ndarray  # (B, 6) by purpose, see PURPOSES
     spent_j: np.ndarray  # (B, S) by node: exactly what the batteries lost
-    members: np.ndarray  # awake nodes of the cluster, head included
+    members: np.ndarray  # awake nodes, head included; all that woke in a search
     detections: np.ndarray  # awake nodes that detected
     delivered: np.ndarray  # reports the head had, its own included
     dropped: np.ndarray  # chosen nodes that were dead or named twice or out of range
@@ -109,15 +144,27 @@ class Outcome(NamedTuple):
     target_m: np.ndarray  # (B, 2) the truth
     estimate_m: np.ndarray  # (B, 2)
 
+    @classmethod
+    def zeros(cls, rows: int, nodes: int) -> Outcome:
+        """Of the right shapes, before a period."""
+        counts = {name: np.zeros(rows, np.int64) for name in COUNTS}
+        return cls(
+            error_m=np.zeros(rows),
+            energy_j=np.zeros((rows, len(PURPOSES))),
+            spent_j=np.zeros((rows, nodes)),
+            posterior_rms_m=np.zeros(rows),
+            target_m=np.zeros((rows, 2)),
+            estimate_m=np.zeros((rows, 2)),
+            **counts,
+        )
+
     @property
     def energy_mj(self) -> np.ndarray:
         """(B,) energy of the period in mJ, summed in the fixed order of PURPOSES."""
-        total = np.zeros(len(self.energy_j))
-        for purpose in range(self.energy_j.shape[1]):
-            total += self.energy_j[:, purpose]
-        return 1e3 * total
+        return 1e3 * self.energy_j.cumsum(axis=1)[:, -1]
 
 
+COUNTS = ("members", "detections", "delivered", "dropped", "handover", "searched", "resampled", "alive")
 PURPOSES = ("sensing", "handover", "invitation", "report", "broadcast", "search")
 
 

@@ -74,7 +74,9 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             seed: an int seeds row i with seed + i; a list seeds each row, None leaves its generator going.
         """
         rows = self._rows_to_reset(options)
-        seeds = [None if seed is None else seed + i for i in range(self.num_envs)] if not isinstance(seed, list) else seed
+        seeds = (
+            [None if seed is None else seed + i for i in range(self.num_envs)] if not isinstance(seed, list) else seed
+        )
         if len(seeds) != self.num_envs:
             raise ValueError(f"seed has {len(seeds)} entries: must have one for each of the {self.num_envs} rows")
         for i in np.flatnonzero(rows):
@@ -93,8 +95,8 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         good = isinstance(mask, np.ndarray) and mask.shape == (self.num_envs,) and mask.dtype == bool and mask.any()
         if not good or (self._state is None and not mask.all()):
             raise ValueError(
-                f"options['reset_mask'] = {mask!r}: must be a NumPy bool array of shape ({self.num_envs},) with at least"
-                " one True, after a reset of all rows"
+                f"options['reset_mask'] = {mask!r}: must be a NumPy bool array of shape ({self.num_envs},) with at"
+                " least one True, after a reset of all rows"
             )
         return mask
 
@@ -166,16 +168,12 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         return tuple(frame(self._state, self.scenario, row) for row in range(self.num_envs))
 
     def _checked(self, actions):
+        if isinstance(actions, (list, tuple)) and isinstance(actions[0], dict):  # as policies' predict() gives them
+            actions = {name: np.stack([one[name] for one in actions]) for name in actions[0]}
         if isinstance(actions, dict):
             actions = {name: np.asarray(value) for name, value in actions.items()}
-        elif not isinstance(actions, (list, tuple)) and getattr(actions, "dtype", None) != object:
+        else:
             actions = np.asarray(actions, dtype=self.action_space.dtype)
-        else:  # a sequence of single actions
-            single = list(actions)
-            if single and isinstance(single[0], dict):
-                actions = {name: np.stack([one[name] for one in single]) for name in single[0]}
-            else:
-                actions = np.asarray(single, dtype=self.action_space.dtype)
         if not self.action_space.contains(actions):
             raise ValueError(f"actions {actions!r} are not in {self.action_space}")
         return actions

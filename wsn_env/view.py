@@ -161,9 +161,7 @@ class View:
             cov=a["cov"],
             predicted_mean=a["predicted_mean"],
             predicted_cov=a["predicted_cov"],
-            network=Network(
-                a["positions"], a["battery"], (a["battery"] > 0).sum(axis=1), heads, members, n_members
-            ),
+            network=Network(a["positions"], a["battery"], (a["battery"] > 0).sum(axis=1), heads, members, n_members),
             reports=Reports(count, node, value),
         )
 

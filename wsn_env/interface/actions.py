@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from gymnasium import spaces
 
+from wsn_env.compiling import lean_kernel
 from wsn_env.interface.merit import ORDERS, order_by_information
 from wsn_env.physics.constants import constants
 from wsn_env.scenario import Scenario, suggest
@@ -27,35 +28,28 @@ class MenuAction:
 
     def cluster(self, action, view: View) -> Cluster:
         """The cluster that the menu's entries name."""
-        action = np.asarray(action).reshape(-1)
-        keep, moves = action == 0, action > MENU_MEMBERS + 1
-        count = np.where(keep, 0, (action - 1) % (MENU_MEMBERS + 1))
-        moves = (moves | (view.head < 0)) & ~(keep & (view.head >= 0))
-        ordered = self._ordered(np.where(moves, -1, view.head), view)
-        head = np.where(moves, ordered[:, 0], view.head)
-        # A moved head is the first of the order; a kept one has been left out of it.
-        slots = np.arange(MENU_MEMBERS + 1)
-        wanted = slots < (count + moves)[:, None]
-        members = np.where(wanted, ordered[:, : MENU_MEMBERS + 1], -1).astype(np.int32)
-        if keep.any():
-            members = _with_standing(members, keep & (view.head >= 0), view)
-        return Cluster(head, members)
+        actions = np.ascontiguousarray(action, dtype=np.int64).reshape(-1)
+        moves = (actions > MENU_MEMBERS + 1) | (view.head < 0)
+        nodes = self._ordered(moves, view)
+        network = view.network
+        width = MENU_MEMBERS + 1 if actions.all() else max(MENU_MEMBERS + 1, network.n_members.max())
+        heads, members = np.empty(len(actions), np.int64), np.full((len(actions), width), -1, np.int32)
+        standing = (network.head, network.members, network.n_members)
+        _read_menu(0, len(actions), actions, moves, nodes, standing, heads, members)
+        return Cluster(heads, members)
 
-    def _ordered(self, heads, view: View) -> np.ndarray:
-        """(B, K) candidates in order of merit without the given heads, -1 at the end."""
+    def _ordered(self, moves, view: View) -> np.ndarray:
+        """(B, K) candidates in order of merit, -1 at the end."""
         nodes = view.nearest(self._candidates)[0]
         if self._order == "nearest":
-            others = nodes != heads[:, None]
-            place = np.argsort(~others, axis=1, kind="stable")
-            return np.where(np.take_along_axis(others, place, axis=1), np.take_along_axis(nodes, place, axis=1), -1)
-        ordered = np.empty_like(nodes)
-        order_by_information(
-            0, len(nodes), self._constants, view.positions, heads, view.predicted_mean, view.predicted_cov, nodes, ordered
-        )
+            return nodes
+        ordered, kept = np.empty_like(nodes), np.where(moves, -1, view.head)
+        mean, cov = view.predicted_mean, view.predicted_cov
+        order_by_information(0, len(nodes), self._constants, view.positions, kept, mean, cov, nodes, ordered)
         return ordered
 
     def masks(self, view: View) -> np.ndarray:
-        """(B, 19) bool: what differs from all smaller entries. Counts beyond the living, and keeping no head, do not."""
+        """(B, 19) bool: what differs from all smaller entries; counts beyond the living, or keeping no head, do not."""
         living = (view.nearest(self._candidates)[0] >= 0).sum(axis=1)
         n = np.arange(MENU_MEMBERS + 1)
         standing = view.head >= 0
@@ -65,19 +59,32 @@ class MenuAction:
         return valid
 
 
-def _with_standing(members, keep, view: View) -> np.ndarray:
-    """Put the standing members into the rows where `keep`."""
-    count = np.where(keep, view.network.n_members, 0)
-    most = count.max()
-    out = np.full((len(members), max(members.shape[1], most)), -1, dtype=np.int32)
-    out[~keep, : members.shape[1]] = members[~keep]
-    rows, slots = np.nonzero(np.arange(most) < count[:, None])
-    out[rows, slots] = view.network.members[rows, slots]
-    return out
+@lean_kernel
+def _read_menu(start, stop, actions, moves, nodes, standing, heads, members):
+    """Fill heads (B,) and members (B, M) from the menu's entries and the candidates in order of merit."""
+    standing_head, standing_members, n_members = standing
+    for b in range(start, stop):
+        head = standing_head[b]
+        if actions[b] == 0 and head >= 0:  # the cluster as it is
+            heads[b] = head
+            for k in range(n_members[b]):
+                members[b, k] = standing_members[b, k]
+            continue
+        left = (actions[b] - 1) % (MENU_MEMBERS + 1) if actions[b] > 0 else 0
+        if moves[b]:  # the best leads
+            head = -1
+            left += 1
+        heads[b] = nodes[b, 0] if moves[b] else head
+        slot = 0
+        for node in nodes[b]:
+            if left > 0 and node >= 0 and node != head:
+                members[b, slot] = node
+                slot += 1
+                left -= 1
 
 
 class SubsetAction:
-    """MultiDiscrete [K + 1] + [2] * K: the head (0: keep it, j: the j-th nearest), and which of the K nearest are in."""
+    """MultiDiscrete [K + 1] + [2] * K: the head (0: keep it, j: the j-th nearest); which of the K nearest are in."""
 
     def __init__(self, scenario: Scenario, order: str, candidates: int):
         self.space = spaces.MultiDiscrete([candidates + 1] + [2] * candidates)
@@ -127,9 +134,7 @@ class ClusterAction:
         self.space = spaces.Dict({"head": spaces.Discrete(nodes), "members": spaces.MultiDiscrete([2] * nodes)})
 
     def cluster(self, action, view: View) -> Cluster:
-        """The choice itself; a list of single choices is taken too."""
-        if isinstance(action, (list, tuple)) or getattr(action, "dtype", None) == object:
-            action = {name: np.stack([one[name] for one in action]) for name in ("head", "members")}
+        """The choice itself."""
         rows = len(view.period)
         return Cluster.of(
             np.asarray(action["head"]).reshape(rows), np.asarray(action["members"]).reshape(rows, -1) == 1

@@ -2,21 +2,21 @@
 
 import numpy as np
 
-from wsn_env.compiling import kernel, piece
+from wsn_env.compiling import kernel, lean_piece
 from wsn_env.physics.field import squared_distance
 from wsn_env.physics.sensing import detection_piece, strength
 
 ORDERS = ("nearest", "information")
 
 
-@piece
+@lean_piece
 def mean_detection(positions, node, mean, cov, c):
     """Detection probability at the root mean square distance under the belief."""
     squared = squared_distance(positions, node, mean[0], mean[2]) + 0.5 * (cov[0, 0] + cov[2, 2])
     return detection_piece(np.sqrt(squared), c)
 
 
-@piece
+@lean_piece
 def gain(positions, node, mean, cov, p00, p01, p11, c):
     """Expected drop of the position covariance's trace by one report of `node` [m^2], and the covariance after it.
 

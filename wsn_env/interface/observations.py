@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from gymnasium import spaces
 
-from wsn_env.compiling import kernel
+from wsn_env.compiling import lean_kernel
 from wsn_env.interface.merit import gain, mean_detection
 from wsn_env.numerics import log
 from wsn_env.physics.constants import constants
@@ -49,9 +49,10 @@ CANDIDATE_FEATURES = (
 BOUND = 10.0
 
 
-@kernel
-def _encode(start, stop, cs, battery_j, view, nodes, distances, belief, candidates):
+@lean_kernel
+def _encode(start, stop, cs, battery_j, view, nodes, distances, out):
     c = cs[0]
+    size, width = len(BELIEF_FEATURES), len(CANDIDATE_FEATURES)
     r = c.radius_m
     for b in range(start, stop):
         (lam, log_miss, mean, cov, network, reports) = view
@@ -67,7 +68,8 @@ def _encode(start, stop, cs, battery_j, view, nodes, distances, belief, candidat
         ex, ey = (m[1] / speed, m[3] / speed) if speed > 1e-9 else (1.0, 0.0)
         cos2, sin2 = (off / root, p[0, 2] / root) if root > 1e-12 else (1.0, 0.0)
         c2, s2 = ex * ex - ey * ey, 2.0 * ex * ey
-        f = belief[b]
+        f = out[b]
+        f[:] = 0.0
         f[0] = 0.5 * log(max(lam[b], 1e-3))
         f[1] = 0.5 * log(major)
         f[2] = 0.5 * log(minor)
@@ -79,7 +81,6 @@ def _encode(start, stop, cs, battery_j, view, nodes, distances, belief, candidat
         f[8] = 0.5 * log(max(p[1, 1] + p[3, 3], 1e-6))
         f[9] = 0.2 * log_miss[b]
         f[10] = 0.25 * reports.count[b]
-        f[11:18] = 0.0
         if head >= 0:
             dx, dy = (positions[head, 0] - m[0]) / r, (positions[head, 1] - m[2]) / r
             f[11] = dx * ex + dy * ey
@@ -98,8 +99,7 @@ def _encode(start, stop, cs, battery_j, view, nodes, distances, belief, candidat
         j = 0
         for k in range(nodes.shape[1]):
             node = nodes[b, k]
-            g = candidates[b, k]
-            g[:] = 0.0
+            g = f[size + k * width : size + (k + 1) * width]
             if node < 0:
                 g[2] = BOUND
                 continue
@@ -120,10 +120,7 @@ def _encode(start, stop, cs, battery_j, view, nodes, distances, belief, candidat
             drop = gain(positions, node, m, p, p[0, 0], p[0, 2], p[2, 2], c)[0]
             g[8] = 0.25 * log(max(drop / (p[0, 0] + p[2, 2] + 1e-12), 1e-6))
         for i in range(len(f)):
-            f[i] = min(max(f[i], -BOUND), BOUND)
-        for k in range(len(candidates[b])):
-            for i in range(candidates.shape[2]):
-                candidates[b, k, i] = min(max(candidates[b, k, i], -BOUND), BOUND)
+            f[i] = min(max(f[i], np.float32(-BOUND)), np.float32(BOUND))
 
 
 class CandidatesObservation:
@@ -140,12 +137,9 @@ class CandidatesObservation:
         """(B, n) float32, fresh."""
         rows = len(view.period)
         nodes, distances = view.nearest(self.shape[0])
-        belief, candidates = np.empty((rows, self.size)), np.empty((rows, *self.shape))
-        seen = (view.lam, view.log_miss, view.predicted_mean, view.predicted_cov, view.network, view.reports)
-        _encode(0, rows, self._constants, self._battery_j, seen, nodes, distances, belief, candidates)
         out = np.empty((rows, self.space.shape[0]), np.float32)
-        out[:, : self.size] = belief
-        out[:, self.size :] = candidates.reshape(rows, -1)
+        seen = (view.lam, view.log_miss, view.predicted_mean, view.predicted_cov, view.network, view.reports)
+        _encode(0, rows, self._constants, self._battery_j, seen, nodes, distances, out)
         return out
 
 

@@ -65,7 +65,14 @@ def frame(state: State, scenario: Scenario, row: int = 0) -> np.ndarray:
         disc(hx, hy, 7, fill=HEAD)
     _cross(draw, *pixel(*belief.mean[row, ::2]), ESTIMATE)
     disc(*state.track[row, min(state.period[row], scenario.periods), ::2], 5, outline=TRUTH, width=3)
-    legend = (("head", HEAD), ("member", MEMBER), ("report", REPORT), ("particles", CLOUD), ("estimate", ESTIMATE), ("target", TRUTH))
+    legend = (
+        ("head", HEAD),
+        ("member", MEMBER),
+        ("report", REPORT),
+        ("particles", CLOUD),
+        ("estimate", ESTIMATE),
+        ("target", TRUTH),
+    )
     for k, (word, colour) in enumerate(legend):
         x = MARGIN + 94 * k
         draw.rectangle((x, SIZE - 17, x + 9, SIZE - 8), fill=colour)

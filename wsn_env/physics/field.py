@@ -3,7 +3,7 @@
 import numpy as np
 
 from wsn_env import draws
-from wsn_env.compiling import kernel, piece
+from wsn_env.compiling import lean_kernel, lean_piece, piece
 
 
 @piece
@@ -14,7 +14,7 @@ def scatter(stream, side_m, positions):
         positions[i, 1] = side_m * draws.uniform(stream, 2 * i + 1)
 
 
-@piece
+@lean_piece
 def squared_distance(positions, i, x, y):
     """Squared distance of node i to (x, y) [m^2]."""
     dx = positions[i, 0] - x
@@ -22,7 +22,7 @@ def squared_distance(positions, i, x, y):
     return dx * dx + dy * dy
 
 
-@piece
+@lean_piece
 def nearest_living(positions, battery, x, y):
     """The living node nearest to (x, y); the lower index wins a tie; -1: none is alive."""
     best, shortest = -1, np.inf
@@ -33,7 +33,7 @@ def nearest_living(positions, battery, x, y):
     return best
 
 
-@piece
+@lean_piece
 def nearest_candidates(positions, battery, x, y, nodes, distances):
     """The K living nodes nearest to (x, y) in order of distance.
 
@@ -58,7 +58,7 @@ def nearest_candidates(positions, battery, x, y, nodes, distances):
         distances[k] = np.sqrt(distances[k])
 
 
-@kernel
+@lean_kernel
 def _nearest_rows(start, stop, positions, battery, points, nodes, distances):
     for b in range(start, stop):
         nearest_candidates(positions[b], battery[b], points[b, 0], points[b, 1], nodes[b], distances[b])

@@ -183,8 +183,9 @@ def _heading(s, c):
 def _visit(stream, speed_ms, period_s, side_m, track):
     x = side_m * draws.uniform(stream, 0)
     y = side_m * draws.uniform(stream, 1)
-    goal_x, goal_y = x, y
-    draw = 2
+    goal_x = side_m * draws.uniform(stream, 2)
+    goal_y = side_m * draws.uniform(stream, 3)
+    draw = 4
     for k in range(len(track)):
         if k > 0:
             left = speed_ms * period_s

@@ -6,13 +6,13 @@ Reports may be lost and are tried again (assumption d of Xiang & Guo, 2013); con
 import numpy as np
 
 from wsn_env import draws
-from wsn_env.compiling import piece
+from wsn_env.compiling import lean_piece, piece
 from wsn_env.physics.field import squared_distance
 
 SENSING, HANDOVER, INVITATION, REPORT, BROADCAST, SEARCH = range(6)
 
 
-@piece
+@lean_piece
 def spend(node, joules, purpose, battery, spent, energy):
     """Charge a node; what it cannot pay empties it. Returns whether it could pay in full."""
     before = battery[node]
@@ -23,13 +23,13 @@ def spend(node, joules, purpose, battery, spent, energy):
     return before >= joules
 
 
-@piece
+@lean_piece
 def transmission(bits, squared, c):
     """Energy of sending `bits` over a squared distance [J]: bits (e1 + e2 d^2), eq. 5."""
     return bits * (c.tx_j_per_bit + c.amplifier_j_per_bit_m2 * squared)
 
 
-@piece
+@lean_piece
 def send(sender, receiver, bits, purpose, positions, battery, spent, energy, c):
     """One packet from node to node (eq. 5). Returns whether both could pay, so that it arrived if not lost."""
     squared = squared_distance(positions, sender, positions[receiver, 0], positions[receiver, 1])
@@ -38,7 +38,7 @@ def send(sender, receiver, bits, purpose, positions, battery, spent, energy, c):
     return battery[receiver] > 0.0 and spend(receiver, bits * c.rx_j_per_bit, purpose, battery, spent, energy)
 
 
-@piece
+@lean_piece
 def report(key, period, node, head, purpose, positions, battery, spent, energy, c):
     """A member's report with its retries. Returns whether the head has it; the head's own is free."""
     if node == head:
@@ -52,7 +52,7 @@ def report(key, period, node, head, purpose, positions, battery, spent, energy, 
     return False
 
 
-@piece
+@lean_piece
 def broadcast(head, nodes, count, positions, battery, spent, energy, c):
     """The head's word to resample: one transmission as far as the farthest living member, who all pay to hear it."""
     farthest = -1.0
@@ -94,7 +94,7 @@ def standing_members(members, battery):
     return count
 
 
-@piece
+@lean_piece
 def form(head, chosen, count, network, b, spent, energy, c):
     """Make the chosen cluster the standing one: handover from the old head, invitations to new members.
 
@@ -102,7 +102,7 @@ def form(head, chosen, count, network, b, spent, energy, c):
 
     Args:
         head: the new head, alive.
-        chosen: (M,) its first `count` entries are living members in ascending order, the head left out.
+        chosen: (M,) its first `count` entries are living members in ascending order, the head left out. Overwritten.
 
     Returns: whether the head's role was handed over.
     """
@@ -110,7 +110,6 @@ def form(head, chosen, count, network, b, spent, energy, c):
     old, members = network.head[b], network.members[b]
     changed = old != head
     handed = changed and old >= 0 and send(old, head, c.handover_bits, HANDOVER, positions, battery, spent, energy, c)
-    joined = np.empty(count, np.int32)
     n, j = 0, 0
     for k in range(count):
         node = chosen[k]
@@ -118,9 +117,10 @@ def form(head, chosen, count, network, b, spent, energy, c):
             j += 1
         stands = not changed and j < network.n_members[b] and members[j] == node
         if stands or send(head, node, c.invitation_bits, INVITATION, positions, battery, spent, energy, c):
-            joined[n] = node
+            chosen[n] = node  # n <= k: what is overwritten has been read
             n += 1
-    members[:n] = joined[:n]
+    for k in range(n):
+        members[k] = chosen[k]
     network.head[b] = head
     network.n_members[b] = n
     return handed

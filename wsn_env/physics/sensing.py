@@ -6,14 +6,14 @@ The likelihood of a measurement over a particle cloud stands with the filter, in
 import numpy as np
 
 from wsn_env import draws
-from wsn_env.compiling import kernel, piece
+from wsn_env.compiling import lean_kernel, lean_piece
 from wsn_env.numerics import exp, log
 from wsn_env.physics.constants import CONSTANTS
 from wsn_env.physics.field import squared_distance
 from wsn_env.scenario import Detection
 
 
-@piece
+@lean_piece
 def detection_piece(distance, c):
     """Eqs. 2-3 for one distance [m] and a record of constants."""
     if distance <= c.inner_m:
@@ -25,7 +25,7 @@ def detection_piece(distance, c):
     return c.ceiling * exp(-c.decay * exp(c.decay_power * log(a1) - c.edge_power * log(a2)))
 
 
-@kernel
+@lean_kernel
 def _detection_probabilities(constants, distances, out):
     c = constants[0]
     for i in range(len(distances)):
@@ -70,33 +70,45 @@ def joint_detection_probability(probabilities):
     return 1.0 - missed[..., -1]
 
 
-@piece
+@lean_piece
 def detects(key, period, node, distance, c):
     """Whether a node, if awake, detects the target in this period."""
     p = detection_piece(distance, c)
     return p > 0.0 and draws.uniform(draws.stream(key, period, draws.DETECTION), node) < p
 
 
-@piece
+@lean_piece
 def strength(squared, c):
     """Noise-free strength at a squared distance [m^2], in dB or in power."""
     fall = c.slope * log(max(squared, c.floor_m * c.floor_m, 1e-12))
     return c.level - fall if c.model == 1 else c.level * exp(-fall)
 
 
-@piece
+@lean_piece
+def measured_strength(key, period, node, squared, c):
+    """The strength that a node measures at a squared distance [m^2] (eq. 1), in dB or in power."""
+    noise, _ = draws.normal_pair(draws.stream(key, period, draws.MEASUREMENT), node)
+    return strength(squared, c) + c.noise * noise
+
+
+@lean_piece
 def measure(key, period, node, positions, target, c, value):
-    """What node `node` measures if it detects: `value` (2,) = x, y [m] (eq. 7), or strength and 0 (eq. 1)."""
-    e0, e1 = draws.normal_pair(draws.stream(key, period, draws.MEASUREMENT), node)
+    """What node `node` measures if it detects: `value` (2,) = x, y [m] (eq. 7), or strength and 0 (eq. 1).
+
+    Args:
+        target: (x, y), the true position [m].
+    """
     if c.model == 0:
+        e0, e1 = draws.normal_pair(draws.stream(key, period, draws.MEASUREMENT), node)
         value[0] = target[0] + c.noise * e0
-        value[1] = target[2] + c.noise * e1
+        value[1] = target[1] + c.noise * e1
     else:
-        value[0] = strength(squared_distance(positions, node, target[0], target[2]), c) + c.noise * e0
+        squared = squared_distance(positions, node, target[0], target[1])
+        value[0] = measured_strength(key, period, node, squared, c)
         value[1] = 0.0
 
 
-@piece
+@lean_piece
 def log_miss_probability(mean, cov, positions, nodes, count, head, c):
     """Log of the probability that none of the awake nodes would have been heard, averaged over the belief.
 

@@ -5,7 +5,7 @@ vector registers of any width and the bits stay the same.
 """
 
 import numpy as np
-from numba import int32, uint64
+from numba import int32, uint32
 
 from wsn_env import draws
 from wsn_env.compiling import kernel, piece
@@ -128,6 +128,11 @@ def moments(x, weights, reference, mean, cov):
             entry += 1
     for a in range(4):
         cov[a, a] = max(cov[a, a], 0.0)
+    for a in range(4):
+        for b in range(a + 1, 4):  # rounding must not correlate a collapsed cloud beyond 1
+            limit = np.sqrt(cov[a, a] * cov[b, b])
+            cov[a, b] = min(max(cov[a, b], -limit), limit)
+            cov[b, a] = cov[a, b]
     return total * total / s[1], total
 
 
@@ -171,7 +176,7 @@ def resample(u, x, log_weights, weights, total, ancestors):
     last = int32(n)
     for i in range(n - 1):
         cumulated += np.float64(weights[i])
-        ancestors[min(int32(cumulated * scale - u + 1.0), last)] += int32(1)
+        ancestors[uint32(min(int32(cumulated * scale - u + 1.0), last))] += int32(1)
     ancestor = int32(-1)
     for k in range(n):
         ancestor += ancestors[k]
@@ -179,7 +184,7 @@ def resample(u, x, log_weights, weights, total, ancestors):
     for axis in range(4):
         coordinate = x[axis]
         for k in range(n):
-            weights[k] = coordinate[ancestors[k]]
+            weights[k] = coordinate[uint32(ancestors[k])]  # unsigned: no wrap-around to provide for, a quarter faster
         for k in range(n):
             coordinate[k] = weights[k]
     log_weights[:] = F(0)

@@ -1,7 +1,5 @@
 """The memoryless estimate of the paper's static-cluster system: the plain mean of a period's measurements."""
 
-import numpy as np
-
 from wsn_env.scenario import Position, Scenario
 from wsn_env.types import Belief, Network, Reports
 

@@ -1,0 +1,221 @@
+"""The contestant: system A's environment as one would first write it, after the paper and a textbook.
+
+NumPy in double precision, NumPy's generator, Python loops over the members, one field at a time. The physics is that of
+wsn_env's PreDC-v0 without the search for lost targets (so that it does less).
+"""
+
+import math
+
+import numpy as np
+import scipy.stats
+from filterpy.monte_carlo import systematic_resample
+
+from wsn_env.scenario import Scenario
+
+
+class ParticleFilter:
+    """A bootstrap filter over particles (P, 4) = x, vx, y, vy [m, m/s]."""
+
+    def __init__(self, particles: np.ndarray, period_s: float, q: float, noise_m: float, rng: np.random.Generator):
+        t = period_s
+        self.particles = particles
+        self.weights = np.full(len(particles), 1 / len(particles))
+        self.transition = np.array([[1, t, 0, 0], [0, 1, 0, 0], [0, 0, 1, t], [0, 0, 0, 1]])
+        self.noise_gain = np.array([[t * t / 2, 0], [t, 0], [0, t * t / 2], [0, t]])
+        self.q, self.noise_m, self.rng = q, noise_m, rng
+
+    def predict(self) -> None:
+        """Constant velocity with white acceleration (eqs. 6, 8)."""
+        noise = self.rng.normal(0, self.q, (len(self.particles), 2))
+        self.particles = self.particles @ self.transition.T + noise @ self.noise_gain.T
+
+    def weigh(self, measurements) -> None:
+        """Multiply the weights with the likelihood of each reported position (eq. 7)."""
+        for z in measurements:
+            squared = np.sum((self.particles[:, [0, 2]] - z) ** 2, axis=1)
+            self.weights *= np.exp(-0.5 * squared / self.noise_m**2)
+        self.weights += 1e-300
+        self.weights /= np.sum(self.weights)
+
+    def estimate(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mean (4,) and covariance (4, 4)."""
+        mean = np.average(self.particles, weights=self.weights, axis=0)
+        deviation = self.particles - mean
+        return mean, (deviation * self.weights[:, None]).T @ deviation
+
+    def effective_size(self) -> float:
+        """N_eff (eq. 14)."""
+        return 1 / np.sum(self.weights**2)
+
+    def resample(self) -> None:
+        """Systematic resampling."""
+        count = len(self.particles)
+        slots = (np.arange(count) + self.rng.random()) / count
+        chosen = np.searchsorted(np.cumsum(self.weights), slots)
+        self.particles = self.particles[np.minimum(chosen, count - 1)]
+        self.weights = np.full(count, 1 / count)
+
+
+class BookFilter(ParticleFilter):
+    """The same filter out of a library's parts, as filterpy's book builds it: SciPy's densities, NumPy's covariance,
+    filterpy's resampling."""
+
+    def weigh(self, measurements) -> None:
+        """Multiply the weights with the likelihood of each reported coordinate (eq. 7)."""
+        for z in measurements:
+            self.weights *= scipy.stats.norm(self.particles[:, 0], self.noise_m).pdf(z[0])
+            self.weights *= scipy.stats.norm(self.particles[:, 2], self.noise_m).pdf(z[1])
+        self.weights += 1e-300
+        self.weights /= np.sum(self.weights)
+
+    def estimate(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mean (4,) and covariance (4, 4)."""
+        mean = np.average(self.particles, weights=self.weights, axis=0)
+        return mean, np.cov(self.particles, rowvar=False, aweights=self.weights, ddof=0)
+
+    def resample(self) -> None:
+        """Systematic resampling."""
+        self.particles = self.particles[systematic_resample(self.weights)]
+        self.weights = np.full(len(self.particles), 1 / len(self.particles))
+
+
+class NaiveEnv:
+    """reset(seed) and step(action) of a Gymnasium environment; the action is the number of members beside the head,
+    who is the living node nearest to the predicted position."""
+
+    def __init__(self, scenario: Scenario | None = None, candidates: int = 12, kind: type = ParticleFilter):
+        self.scenario = scenario or Scenario.named("PreDC-v0")
+        self.candidates = candidates
+        self.kind = kind
+
+    def reset(self, seed: int):
+        """A new episode. Returns observation, info."""
+        s = self.scenario
+        self.rng = np.random.default_rng(seed)
+        self.positions = self.rng.uniform(0, s.field.side_m, (s.field.nodes, 2))
+        self.battery = np.full(s.field.nodes, s.radio.battery_j)
+        self.period, self.head, self.members = 0, None, []
+        self.target = self._draw_target()
+        sds = np.array([s.tracking.start_sd_m, s.tracking.start_sd_ms] * 2)
+        mean = self.target + sds * self.rng.normal(size=4)
+        particles = mean + sds * self.rng.normal(size=(s.tracking.particles, 4))
+        self.filter = self.kind(particles, s.period_s, s.filter_q, s.measurement.noise_m, self.rng)
+        self.mean, self.cov = mean, np.diag(sds**2)
+        return self._observe(), {}
+
+    def step(self, action: int):
+        """One period. Returns observation, reward, terminated, truncated, info."""
+        s = self.scenario
+        self.energy = 0.0
+        self._form(self._nearest(1 + action))
+        self._move_target()
+        reports = self._collect_reports()
+        self.filter.predict()
+        self.filter.weigh(reports)
+        self.mean, self.cov = self.filter.estimate()
+        if self.filter.effective_size() < s.tracking.resample_below * s.tracking.particles:
+            self.filter.resample()
+            self._broadcast()
+        self.period += 1
+        error = math.hypot(self.mean[0] - self.target[0], self.mean[2] - self.target[2])
+        energy_mj = 1e3 * self.energy
+        info = {"error_m": error, "energy_mj": energy_mj}
+        return self._observe(), -(error + s.lam * energy_mj), False, self.period >= s.periods, info
+
+    def _draw_target(self) -> np.ndarray:
+        """The crossing's start and velocity."""
+        s = self.scenario
+        low, high = s.motion.margin_m, s.field.side_m - s.motion.margin_m
+        while True:
+            start, end = self.rng.uniform(low, high, 2), self.rng.uniform(low, high, 2)
+            if np.linalg.norm(end - start) >= s.motion.crossing_m:
+                break
+        velocity = (end - start) / (s.periods * s.period_s)
+        return np.array([start[0], velocity[0], start[1], velocity[1]])
+
+    def _move_target(self) -> None:
+        acceleration = self.rng.normal(0, self.scenario.motion.acceleration_ms2, 2)
+        self.target = self.filter.transition @ self.target + self.filter.noise_gain @ acceleration
+        side = self.scenario.field.side_m
+        for axis in (0, 2):  # the border is a mirror
+            if not 0 <= self.target[axis] <= side:
+                self.target[axis] = -self.target[axis] if self.target[axis] < 0 else 2 * side - self.target[axis]
+                self.target[axis + 1] = -self.target[axis + 1]
+
+    def _nearest(self, count: int) -> list[int]:
+        predicted = (self.filter.transition @ self.mean)[[0, 2]]
+        distances = np.linalg.norm(self.positions - predicted, axis=1)
+        distances[self.battery <= 0] = np.inf
+        return [int(node) for node in np.argsort(distances)[:count] if np.isfinite(distances[node])]
+
+    def _form(self, cluster: list[int]) -> None:
+        """Handover to a new head, invitations to new members."""
+        radio = self.scenario.radio
+        head, members = cluster[0], sorted(cluster[1:])
+        changed = head != self.head
+        if changed and self.head is not None:
+            self._send(self.head, head, self.scenario.handover_bits)
+        for node in members:
+            if changed or node not in self.members:
+                self._send(head, node, radio.invitation_bits)
+        self.head, self.members = head, members
+
+    def _collect_reports(self) -> list[np.ndarray]:
+        s = self.scenario
+        position = self.target[[0, 2]]
+        reports = []
+        for node in [self.head, *self.members]:
+            distance = np.linalg.norm(self.positions[node] - position)
+            if self.rng.random() < self._detection_probability(distance):
+                if node != self.head:
+                    self._send(node, self.head, s.radio.report_bits)
+                reports.append(position + self.rng.normal(0, s.measurement.noise_m, 2))
+        return reports
+
+    def _detection_probability(self, distance: float) -> float:
+        """Eqs. 2-3."""
+        d = self.scenario.detection
+        inner, outer = (1 - d.softness) * d.radius_m, (1 + d.softness) * d.radius_m
+        if distance <= inner:
+            return d.ceiling
+        if distance >= outer:
+            return 0.0
+        return d.ceiling * math.exp(-d.decay * (distance - inner) ** d.decay_power / (outer - distance) ** d.edge_power)
+
+    def _send(self, sender: int, receiver: int, bits: int) -> None:
+        """One packet (eq. 5)."""
+        distance = np.linalg.norm(self.positions[sender] - self.positions[receiver])
+        self._transmit(sender, distance, bits)
+        self._receive(receiver, bits)
+
+    def _transmit(self, node: int, distance: float, bits: int) -> None:
+        radio = self.scenario.radio
+        self._spend(node, bits * (1e-9 * radio.tx_nj_per_bit + 1e-12 * radio.amplifier_pj_per_bit_m2 * distance**2))
+
+    def _receive(self, node: int, bits: int) -> None:
+        self._spend(node, bits * 1e-9 * self.scenario.radio.rx_nj_per_bit)
+
+    def _spend(self, node: int, joules: float) -> None:
+        paid = min(joules, self.battery[node])
+        self.battery[node] -= paid
+        self.energy += paid
+
+    def _broadcast(self) -> None:
+        """The head tells its members to resample."""
+        bits = self.scenario.radio.broadcast_bits
+        if self.members:
+            farthest = max(np.linalg.norm(self.positions[node] - self.positions[self.head]) for node in self.members)
+            self._transmit(self.head, farthest, bits)
+            for node in self.members:
+                self._receive(node, bits)
+
+    def _observe(self) -> np.ndarray:
+        """Belief, and the candidates' offsets, detection probabilities, batteries and roles."""
+        features = [*self.mean, *self.cov.ravel()]
+        predicted = (self.filter.transition @ self.mean)[[0, 2]]
+        for node in self._nearest(self.candidates):
+            offset = self.positions[node] - predicted
+            distance = np.linalg.norm(offset)
+            features += [*offset, distance, self._detection_probability(distance), self.battery[node]]
+            features += [node == self.head, node in self.members]
+        return np.array(features, dtype=np.float32)

@@ -1,0 +1,329 @@
+"""The six laws of the world, on random scenarios with random choices."""
+
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tests.worlds import KEYS, assert_same, choices, keys_of, leaves, living_entries, play, scenarios
+from wsn_env import Cluster, Scenario, View, World, make_policy
+from wsn_env.interface import Interface, Settings
+from wsn_env.interface.actions import ACTIONS
+from wsn_env.interface.observations import OBSERVATIONS
+
+HAND_WRITTEN = ["all", "centroid", "nearest0", "nearest3", "pre_dc", "random", "static_cluster"]
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def law(examples):
+    """Settings of a property test: derandomised, so that a failure is everybody's."""
+    return settings(max_examples=examples, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+
+
+# --- 1: one world ---------------------------------------------------------------------------------------------
+
+
+@law(180)
+@given(scenarios(), KEYS, SEEDS, st.integers(0, 11))
+def test_a_row_of_a_batch_is_a_batch_of_one(scenario, key, seed, row):
+    keys = keys_of(seed, 12)
+    keys[row] = key
+    batch = play(scenario, keys, seed)
+    alone = play(scenario, keys[row : row + 1], seed, pick=[row])
+    for (_, _, state, outcome), (_, _, single, own) in zip(batch, alone, strict=True):
+        assert_same(living_entries(state), living_entries(single), slice(row, row + 1))
+        assert_same(outcome, own, slice(row, row + 1))
+
+
+@law(90)
+@given(scenarios(), SEEDS)
+def test_rows_may_stand_in_any_order(scenario, seed):
+    keys = keys_of(seed, 10)
+    order = np.random.default_rng(seed).permutation(10)
+    for (_, _, state, outcome), (_, _, shuffled, theirs) in zip(
+        play(scenario, keys, seed), play(scenario, keys[order], seed, pick=order), strict=True
+    ):
+        assert_same(living_entries(state), living_entries(shuffled), order)
+        assert_same(outcome, theirs, order)
+
+
+@law(90)
+@given(scenarios(), SEEDS, st.integers(9, 25))
+def test_threads_change_no_bit(scenario, seed, rows):
+    keys = keys_of(seed, rows)
+    for (_, _, one, outcome), (_, _, two, theirs) in zip(
+        play(scenario, keys, seed, threads=1), play(scenario, keys, seed, threads=2), strict=True
+    ):
+        assert_same(one, two)
+        assert_same(outcome, theirs)
+
+
+@law(60)
+@given(scenarios(), SEEDS)
+def test_a_restarted_row_is_a_fresh_one(scenario, seed):
+    keys, again = keys_of(seed, 5), keys_of(seed + 1, 5)
+    *_, (_, _, used, _) = play(scenario, keys, seed)
+    world, rows = World(scenario, threads=1), np.array([True, False, True, True, False])
+    restarted, _ = world.restart(used, rows, again)
+    assert_same(living_entries(restarted), living_entries(world.reset(again)), rows, rows)
+    assert_same(restarted, used, ~rows, ~rows)
+    choice = choices(seed, 0, 5, scenario.field.nodes)
+    assert_same(
+        living_entries(world.step(restarted, choice)[0]),
+        living_entries(world.step(world.reset(again), choice)[0]),
+        rows,
+        rows,
+    )
+
+
+# --- 2: randomness by key -------------------------------------------------------------------------------------
+
+
+def told(state, row):
+    """{node: measurement} of the head's reports."""
+    n = state.reports.count[row]
+    return {int(i): v.tobytes() for i, v in zip(state.reports.node[row, :n], state.reports.value[row, :n], strict=True)}
+
+
+@law(180)
+@given(scenarios(packet_success=1.0, battery_j=1.0, search=False, start="known"), SEEDS)
+def test_what_happens_does_not_depend_on_the_choice(scenario, seed):
+    """Whatever the cluster, those of it report that would have reported had everybody been awake, and the same."""
+    keys, nodes = keys_of(seed, 4), scenario.field.nodes
+    world = World(scenario, threads=1)
+    everybody = world.reset(keys)
+    awake = Cluster(np.zeros(4, int), np.tile(np.arange(nodes), (4, 1)))
+    for _, _, state, outcome in play(scenario, keys, seed):
+        everybody, whole = world.step(everybody, awake)
+        np.testing.assert_array_equal(state.track, everybody.track)
+        np.testing.assert_array_equal(outcome.target_m, whole.target_m)
+        np.testing.assert_array_equal(state.luck, everybody.luck)
+        np.testing.assert_array_equal(state.lam, everybody.lam)
+        np.testing.assert_array_equal(state.network.positions, everybody.network.positions)
+        for row in range(4):
+            member = set(state.network.members[row, : state.network.n_members[row]].tolist())
+            member.add(int(state.network.head[row]))
+            expected = {node: value for node, value in told(everybody, row).items() if node in member}
+            assert told(state, row) == expected
+
+
+@law(90)
+@given(scenarios(battery_j=1.0), SEEDS)
+def test_two_policies_measure_the_same_where_both_do(scenario, seed):
+    keys = keys_of(seed, 3)
+    for (_, _, one, _), (_, _, other, _) in zip(
+        play(scenario, keys, seed), play(scenario, keys, seed + 1), strict=True
+    ):
+        for row in range(3):
+            a, b = told(one, row), told(other, row)
+            assert all(a[node] == b[node] for node in a.keys() & b.keys())
+
+
+# --- 3: no leak -----------------------------------------------------------------------------------------------
+
+
+@law(120)
+@given(scenarios(), SEEDS)
+def test_the_truth_does_not_show(scenario, seed):
+    interfaces = [
+        Interface(scenario, Settings(action=action, observation=observation, order=order))
+        for action, observation, order in [
+            ("menu", "candidates", "nearest"),
+            ("menu", "dict", "information"),
+            ("subset", "view", "nearest"),
+            ("nodes", "view", "nearest"),
+        ]
+    ]
+    assert {i.settings.observation for i in interfaces} == set(OBSERVATIONS)
+    assert {i.settings.action for i in interfaces} <= set(ACTIONS)
+    policies = [make_policy(name, scenario) for name in HAND_WRITTEN]
+    rng = np.random.default_rng(seed)
+    for _, _, state, _ in play(scenario, keys_of(seed, 3), seed):
+        false = state._replace(
+            track=rng.normal(0, 1e3, state.track.shape), key=keys_of(seed + 2, 3), last_search=state.last_search + 1
+        )
+        for interface in interfaces:
+            mine, theirs = View.of(state), View.of(false)
+            assert_same(mine.as_arrays(), theirs.as_arrays())
+            assert_same(
+                dict(leaves({"o": interface.observation.encode(mine)})),
+                dict(leaves({"o": interface.observation.encode(theirs)})),
+            )
+            assert_same({"m": interface.action.masks(mine)}, {"m": interface.action.masks(theirs)})
+        for policy in policies:
+            assert_same(policy.act(View.of(state)), policy.act(View.of(false)))
+
+
+# --- 4: a pure step -------------------------------------------------------------------------------------------
+
+
+@law(120)
+@given(scenarios(), SEEDS)
+def test_a_step_leaves_the_given_state_alone_and_donation_changes_no_bit(scenario, seed):
+    keys = keys_of(seed, 3)
+    donated = play(scenario, keys, seed, donate=True)
+    world = World(scenario, threads=1)
+    state = world.reset(keys)
+    for period, (_, cluster, reused, theirs) in enumerate(donated):
+        kept, asked = state.copy(), Cluster(cluster.head.copy(), cluster.members.copy())
+        after, outcome = world.step(state, cluster)
+        assert_same(state, kept)
+        assert_same(cluster, asked)
+        assert not any(
+            np.shares_memory(a, b) for (_, a), (_, b) in zip(leaves(state), leaves(after), strict=True) if a.size
+        )
+        assert_same(after, reused)
+        assert_same(outcome, theirs)
+        assert_same(world.step(kept, cluster)[0], after)  # again: the same
+        assert (after.period == period + 1).all()
+        state = after
+
+
+def test_a_reset_gives_the_same_world_twice():
+    world = World(Scenario.named("PreDC-v0", particles=20, start="search"), threads=1)
+    assert_same(world.reset([1, 2]), world.reset([1, 2]))
+
+
+# --- 5: energy balances ---------------------------------------------------------------------------------------
+
+
+@law(240)
+@given(scenarios(), SEEDS)
+def test_batteries_lose_what_the_outcome_reports(scenario, seed):
+    for before, _, state, outcome in play(scenario, keys_of(seed, 4), seed):
+        lost = before.network.battery - state.network.battery
+        np.testing.assert_allclose(lost, outcome.spent_j, rtol=0, atol=1e-15)
+        np.testing.assert_allclose(outcome.energy_j.sum(axis=1), outcome.spent_j.sum(axis=1), rtol=1e-12, atol=1e-18)
+        np.testing.assert_allclose(outcome.energy_mj, 1e3 * outcome.energy_j.sum(axis=1), rtol=1e-12)
+        assert (outcome.energy_j >= 0).all() and (outcome.spent_j >= 0).all()
+        assert (state.network.battery >= 0).all()
+
+        # The dead stay dead, spend nothing, lead nobody and report nothing.
+        dead = before.network.battery == 0
+        assert (state.network.battery[dead] == 0).all() and (outcome.spent_j[dead] == 0).all()
+        living = state.network.battery > 0
+        np.testing.assert_array_equal(state.network.alive, living.sum(axis=1))
+        np.testing.assert_array_equal(outcome.alive, living.sum(axis=1))
+        for row in range(4):
+            head = state.network.head[row]
+            members = state.network.members[row, : state.network.n_members[row]]
+            assert head == -1 or living[row, head]
+            assert living[row, members].all()
+            assert head not in members and (np.diff(members) > 0).all()
+            assert head >= 0 or len(members) == 0
+            reporters = state.reports.node[row, : state.reports.count[row]]
+            assert not dead[row, reporters].any()
+            assert (np.diff(reporters) > 0).all()
+
+
+@law(90)
+@given(scenarios(start="search"), SEEDS)
+def test_the_first_search_is_on_the_books(scenario, seed):
+    world, keys = World(scenario, threads=1), keys_of(seed, 4)
+    state, outcome = world.restart(world.reset(keys), np.ones(4, bool), keys)
+    np.testing.assert_allclose(scenario.radio.battery_j - state.network.battery, outcome.spent_j, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(outcome.energy_j.sum(axis=1), outcome.spent_j.sum(axis=1), rtol=1e-12, atol=1e-18)
+    np.testing.assert_array_equal(state.network.alive, (state.network.battery > 0).sum(axis=1))
+
+
+# --- 6: nothing is silently wrong -----------------------------------------------------------------------------
+
+
+def assert_finite(*values):
+    for value in values:
+        for name, array in leaves(value):
+            assert np.isfinite(array).all(), name
+
+
+@law(360)
+@given(scenarios(), SEEDS)
+def test_everything_is_finite_always(scenario, seed):
+    interfaces = [
+        Interface(scenario, Settings(observation=o, order=r))
+        for o, r in [("candidates", "information"), ("dict", "nearest"), ("view", "nearest")]
+    ]
+    policies = [make_policy(name, scenario) for name in HAND_WRITTEN]
+    for _, cluster, state, outcome in play(scenario, keys_of(seed, 3), seed):
+        assert_finite(state, outcome)
+        assert (np.diagonal(state.belief.cov, axis1=1, axis2=2) >= 0).all()
+        assert (state.belief.log_weights <= 0).all()
+        assert (outcome.dropped >= 0).all() and (outcome.dropped <= cluster.members.shape[1] + 1).all()
+        assert (outcome.delivered <= outcome.detections).all()
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            view = View.of(state)
+            assert_finite({"spread": view.spread_m})
+            for policy in policies:
+                choice = policy.act(view)
+                assert choice.head.shape == (3,) and len(choice.members) == 3
+            for interface in interfaces:
+                array = interface.observation.encode(view)
+                space = interface.observation.space
+                for row in range(3):
+                    if isinstance(array, dict):
+                        for name, value in array.items():
+                            assert space[name].contains(value[row]), name
+                    else:
+                        assert space.contains(array[row])
+
+
+@law(120)
+@given(scenarios(battery_j=5e-5), SEEDS, st.sampled_from(HAND_WRITTEN))
+def test_policies_carry_on_to_the_last_node_and_beyond(scenario, seed, name):
+    world, policy = World(scenario, threads=1), make_policy(name, scenario)
+    state = world.reset(keys_of(seed, 3))
+    for _ in range(scenario.periods):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            cluster = policy.act(View.of(state))
+        state, outcome = world.step(state, cluster, donate=True)
+        assert_finite(state, outcome)
+
+
+@pytest.mark.parametrize("tracker", ["particle", "ekf", "snapshot"])
+def test_a_dead_network_goes_on_predicting(tracker):
+    scenario = Scenario.named("PreDC-v0", tracker=tracker, particles=50, battery_j=1e-9, sensing_nj=2.0, nodes=3)
+    world = World(scenario, threads=1)
+    state = world.reset([1])
+    everybody = Cluster(np.zeros(1, int), np.array([[0, 1, 2]]))
+    for _ in range(100):
+        state, outcome = world.step(state, everybody)
+        assert_finite(state, outcome)
+    assert outcome.alive[0] == 0 and state.network.head[0] == -1
+    assert (outcome.energy_mj, outcome.members, outcome.dropped) == (0, 0, 4)
+    assert View.of(state).nearest(5)[0].tolist() == [[-1] * 5]
+    assert View.of(state).nearest_living().tolist() == [-1]
+
+
+def test_one_node_alone():
+    scenario = Scenario.named("PreDC-v0", nodes=1, particles=50)
+    for policy in HAND_WRITTEN:
+        world, state = World(scenario, threads=1), None
+        state = world.reset([1])
+        for _ in range(100):
+            state, outcome = world.step(state, make_policy(policy, scenario).act(View.of(state)))
+            assert_finite(state, outcome)
+            assert outcome.members[0] <= 1
+
+
+def test_time_beyond_the_horizon_stands_still():
+    scenario = Scenario.named("PreDC-v0", nodes=20, particles=50, periods=3)
+    *_, (_, cluster, state, outcome) = play(scenario, keys_of(0, 2), 0)
+    after, later = World(scenario, threads=1).step(state, cluster)
+    np.testing.assert_array_equal(later.target_m, outcome.target_m)
+    assert_finite(after, later)
+
+
+@law(60)
+@given(scenarios(), SEEDS)
+def test_a_view_survives_its_arrays(scenario, seed):
+    """Observation "view" holds all that a policy can see."""
+    policies = [make_policy(name, scenario) for name in HAND_WRITTEN]
+    for _, _, state, _ in play(scenario, keys_of(seed, 2), seed):
+        view = View.of(state)
+        again = View.from_arrays(view.as_arrays())
+        assert_same(view.as_arrays(), again.as_arrays())
+        for policy in policies:
+            assert_same(policy.act(view), policy.act(again))

@@ -1,0 +1,97 @@
+"""How an episode begins: field, track, batteries, lam and the first belief, all by key."""
+
+import numpy as np
+
+from wsn_env import draws
+from wsn_env.compiling import kernel, piece
+from wsn_env.numerics import exp, log
+from wsn_env.physics.field import scatter
+from wsn_env.physics.motion import draw_track
+from wsn_env.scenario import Scenario
+
+START = np.dtype(
+    [
+        ("known", "i8"),
+        ("sd_m", "f8"),
+        ("sd_ms", "f8"),
+        ("battery", "f8"),
+        ("low", "f8"),
+        ("high", "f8"),
+        ("seeded", "i8"),
+        ("field_key", "u8"),
+    ]
+)
+SEARCHED_SD_MS = 1.0  # m/s: what is known of the velocity before a first search
+
+
+def start_record(scenario: Scenario) -> np.ndarray:
+    """What `begin` needs beside the constants, an array of one: P0, battery, lam, the seed of a fixed field."""
+    known = scenario.tracking.start == "known"
+    record = np.zeros(1, START)
+    record["known"] = known
+    record["sd_m"] = scenario.tracking.start_sd_m if known else scenario.field.side_m / 12**0.5
+    record["sd_ms"] = scenario.tracking.start_sd_ms if known else SEARCHED_SD_MS
+    record["battery"] = scenario.radio.battery_j
+    record["low"], record["high"] = scenario.lam_range
+    if scenario.field.field_seed is not None:
+        record["seeded"] = 1
+        record["field_key"] = draws.key_of_seed(scenario.field.field_seed)
+    return record
+
+
+def placed_nodes(scenario: Scenario) -> np.ndarray:
+    """The given nodes (S, 2) [m]; (0, 2) where they are drawn."""
+    positions = scenario.field.positions
+    return np.empty((0, 2)) if positions is None else np.array(positions)
+
+
+@kernel
+def begin(start, stop, cs, rows, keys, motion, numbers, recordings, starts, placed, state):
+    """Field, track, batteries, lam and the first belief of new episodes."""
+    c, s = cs[0], starts[0]
+    for b in range(start, stop):
+        if not rows[b]:
+            continue
+        key = keys[b]
+        state.key[b] = key
+        state.period[b] = 0
+        state.log_miss[b] = 0.0
+        state.last_search[b] = -c.search_gap
+        state.lam[b] = s.low
+        if s.high > s.low:
+            ratio = log(s.high / s.low)
+            state.lam[b] = s.low * exp(ratio * draws.uniform(draws.stream(key, 0, draws.LAM), 0))
+        network = state.network
+        if len(placed) > 0:
+            network.positions[b] = placed
+        else:
+            scatter(draws.stream(s.field_key if s.seeded else key, 0, draws.FIELD), c.side_m, network.positions[b])
+        network.battery[b] = s.battery
+        network.alive[b] = len(network.battery[b])
+        network.head[b] = -1
+        network.n_members[b] = 0
+        state.reports.count[b] = 0
+        state.belief.n_eff[b] = state.belief.particles.shape[2]
+        track_stream = draws.stream(key, 0, draws.TRACK)
+        draw_track(motion, numbers, recordings, track_stream, c.period_s, c.side_m, state.track[b])
+        mean, cov = state.belief.mean[b], state.belief.cov[b]
+        _first_belief(draws.stream(key, 0, draws.START), state.track[b, 0], s, c, mean, cov)
+
+
+@piece
+def _first_belief(stream, truth, s, c, mean, cov):
+    """start="known": mean ~ N(truth, P0), cov = P0; start="search": the whole field, at rest."""
+    cov[:] = 0.0
+    for axis in range(4):
+        cov[axis, axis] = s.sd_m**2 if axis % 2 == 0 else s.sd_ms**2
+    if s.known:
+        ex, ey = draws.normal_pair(stream, 0)
+        evx, evy = draws.normal_pair(stream, 1)
+        mean[0] = truth[0] + s.sd_m * ex
+        mean[1] = truth[1] + s.sd_ms * evx
+        mean[2] = truth[2] + s.sd_m * ey
+        mean[3] = truth[3] + s.sd_ms * evy
+    else:
+        mean[:] = 0.0
+        mean[0] = 0.5 * c.side_m
+        mean[2] = 0.5 * c.side_m

@@ -1,0 +1,30 @@
+"""Published systems rebuilt: for each its tables, figures and claims beside ours. `reproduce` finds them by name."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+
+from wsn_env.progress import Progress
+from wsn_env.scenario import suggest
+
+PAPERS = {"pre_dc": "wsn_env.papers.pre_dc"}
+
+
+def reproduce(name: str, out: str | Path, runs: int = 100, progress: Progress | None = None) -> None:
+    """Rebuild a paper's tables, figures and claims, write them to a folder and print the tables and verdicts.
+
+    Args:
+        name: "pre_dc".
+        out: folder for the files, made if it does not exist.
+        runs: Monte Carlo runs for each cell; at least 2, for standard errors.
+        progress: called as progress(done, total, what) after every simulated period; None: a bar on the terminal.
+
+    Raises:
+        ValueError: for an unknown paper or too few runs.
+    """
+    if name not in PAPERS:
+        raise ValueError(f"paper {name!r} is unknown: {suggest(str(name), PAPERS)}")
+    if isinstance(runs, bool) or not isinstance(runs, int) or runs < 2:
+        raise ValueError(f"runs = {runs!r}: must be a whole number, at least 2 (standard errors need two)")
+    import_module(PAPERS[name]).reproduce(Path(out), runs, progress)

@@ -1,0 +1,209 @@
+"""Figs. 1 and 3-8 of Xiang & Guo (2013): what each shows, as CSV and as a picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from wsn_env.papers.pre_dc.systems import MOTIONS, PARTICLES, SYSTEMS, Results
+from wsn_env.papers.report import Sheet, write_picture, write_sheet
+from wsn_env.papers.rollout import standard_error
+from wsn_env.physics.sensing import detection_probability
+from wsn_env.scenario import Detection
+
+# Okabe and Ito's colours, which colour-blind readers tell apart; a system keeps its colour in every figure.
+STATIC, EKF, PRE_DC, GREEN, GREY = "#D55E00", "#0072B2", "#000000", "#009E73", "#999999"
+LOOKS = {  # system: label, style of its line
+    "static": ("static-cluster", dict(color=STATIC, linestyle="--")),
+    "ekf": ("EKF, 2 nodes", dict(color=EKF, linestyle="-.")),
+    "pre_dc": ("Pre-DC", dict(color=PRE_DC, linestyle="-")),
+}
+TRACKS = {
+    "straight": ("diagonal", dict(color=PRE_DC, linestyle="-")),
+    "sine": ("sine", dict(color=EKF, linestyle="--")),
+    "circle": ("circle", dict(color=STATIC, linestyle="-.")),
+    "turns": ("random turns", dict(color=GREEN, linestyle=":")),
+}
+
+
+def write(out: Path, results: Results) -> None:
+    """Every figure's CSV and PNG."""
+    detection = Detection()
+    sheets = {
+        "fig1": detection_curve(detection),
+        "fig3": error_per_period(results),
+        "fig4": energy_per_period(results),
+        "fig5": tracks(results),
+        "fig6": error_on_tracks(results),
+        "fig7": error_of_particles(results, 0),
+        "fig8": error_of_particles(results, 1),
+    }
+    pictures = {
+        "fig1": draw_detection(sheets["fig1"], detection),
+        "fig3": draw_error(sheets["fig3"]),
+        "fig4": draw_energy(sheets["fig4"]),
+        "fig5": draw_tracks(results),
+        "fig6": draw_error_on_tracks(sheets["fig6"]),
+        "fig7": draw_particles(sheets["fig7"], "x", 7),
+        "fig8": draw_particles(sheets["fig8"], "y", 8),
+    }
+    for name, sheet in sheets.items():
+        write_sheet(out / f"{name}.csv", sheet)
+        write_picture(out / f"{name}.png", pictures[name])
+
+
+# --- figures as tables --------------------------------------------------------------------------------------
+
+
+def detection_curve(detection: Detection) -> Sheet:
+    """Fig. 1: p(d) of eqs. 2-3."""
+    distance = np.linspace(0.0, 15.0, 151)
+    p = detection_probability(distance, detection)
+    return Sheet(("distance_m", "probability"), list(zip(distance, p, strict=True)))
+
+
+def error_per_period(results: Results) -> Sheet:
+    """Fig. 3: RMS over the runs in each period, of the systems of Table 2 at 225 nodes."""
+    columns = [results.system(name).rms_per_period_m(SYSTEMS[name].heard_only) for name in LOOKS]
+    return _by_period([f"{name}_rms_m" for name in LOOKS], columns)
+
+
+def energy_per_period(results: Results) -> Sheet:
+    """Fig. 4: mean energy in each period at 225 nodes."""
+    static = results.system("static")
+    columns = [static.report_mj, static.energy_mj, results.system("ekf").energy_mj, results.system("pre_dc").energy_mj]
+    names = ("static_reports_mj", "static_total_mj", "ekf_mj", "pre_dc_mj")
+    return _by_period(names, [energy.mean(axis=0) for energy in columns])
+
+
+def tracks(results: Results) -> Sheet:
+    """Fig. 5: the first run's target and estimate on four tracks."""
+    rows = []
+    for motion in MOTIONS:
+        record = results.motion(motion)
+        for k, (target, estimate) in enumerate(zip(record.target_m[0], record.estimate_m[0], strict=True)):
+            rows.append((motion, k + 1, *target, *estimate))
+    return Sheet(("track", "period", "target_x_m", "target_y_m", "estimate_x_m", "estimate_y_m"), rows)
+
+
+def error_on_tracks(results: Results) -> Sheet:
+    """Fig. 6: RMS over the runs in each period on those tracks."""
+    columns = [results.motion(motion).rms_per_period_m() for motion in MOTIONS]
+    return _by_period([f"{motion}_rms_m" for motion in MOTIONS], columns)
+
+
+def error_of_particles(results: Results, axis: int) -> Sheet:
+    """Figs. 7-8: error along x (0) or y (1) against the number of particles."""
+    rows = []
+    for count in PARTICLES:
+        errors = results.particles(count).axis_rms_m(axis)
+        rows.append((count, errors.mean(), standard_error(errors), len(errors)))
+    return Sheet(("particles", f"rms_{'xy'[axis]}_m", "stderr_m", "runs"), rows)
+
+
+def _by_period(names, columns) -> Sheet:
+    rows = [(k + 1, *values) for k, values in enumerate(zip(*columns, strict=True))]
+    return Sheet(("period", *names), rows)
+
+
+# --- figures as pictures ------------------------------------------------------------------------------------
+
+
+def draw_detection(sheet: Sheet, detection: Detection):
+    """Fig. 1."""
+    title = "Fig. 1 (our reading): probability of detection, eqs. 2-3"
+    figure, axes = _axes(title, "distance d to the target [m]", "p(d)")
+    distance, p = map(np.array, zip(*sheet.rows, strict=True))
+    axes.plot(distance, p, color=PRE_DC)
+    inner = (1 - detection.softness) * detection.radius_m
+    marks = ((inner, "(1 - δ) r"), (detection.radius_m, "r"), (detection.reach_m, "(1 + δ) r"))
+    for x, name in marks:
+        axes.axvline(x, color=GREY, linewidth=0.8, linestyle=":")
+        axes.annotate(name, (x, 0.675), xytext=(3, 0), textcoords="offset points", fontsize=9, color="#555555")
+    axes.set(xlim=(0, 15), ylim=(0, 0.72))
+    return figure
+
+
+def draw_error(sheet: Sheet):
+    """Fig. 3."""
+    figure, axes = _axes("Fig. 3: error of the three systems, 225 nodes", "time [s]", "RMS error over the runs [m]")
+    _lines(axes, sheet, LOOKS)
+    return figure
+
+
+def draw_energy(sheet: Sheet):
+    """Fig. 4."""
+    figure, axes = _axes("Fig. 4: energy of the three systems, 225 nodes", "time [s]", "mean energy of a period [mJ]")
+    looks = {
+        "static": ("static-cluster, reports only", LOOKS["static"][1]),
+        "ekf": LOOKS["ekf"],
+        "pre_dc": LOOKS["pre_dc"],
+    }
+    kept = Sheet(sheet.columns[:2] + sheet.columns[3:], [row[:2] + row[3:] for row in sheet.rows])
+    _lines(axes, kept, looks)
+    return figure
+
+
+def draw_tracks(results: Results):
+    """Fig. 5: four fields."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.5, 7.6), layout="constrained")
+    for axes, motion in zip(figure.subplots(2, 2, sharex=True, sharey=True).flat, MOTIONS, strict=True):
+        record = results.motion(motion)
+        axes.plot(*record.target_m[0].T, color=GREY, linewidth=3.5, label="target")
+        axes.plot(*record.estimate_m[0].T, color=EKF, linewidth=1.1, marker=".", markersize=3.5, label="estimate")
+        axes.set(title=TRACKS[motion][0], xlim=(0, 100), ylim=(0, 100), aspect="equal")
+        axes.label_outer()
+        _tidy(axes)
+    for axes in figure.axes:
+        axes.set_xlabel("x [m]" if axes in figure.axes[2:] else "")
+        axes.set_ylabel("y [m]" if axes in figure.axes[::2] else "")
+    figure.axes[0].legend(frameon=False, loc="upper left")
+    figure.suptitle("Fig. 5: Pre-DC on four tracks, the first run of each, 225 nodes")
+    return figure
+
+
+def draw_error_on_tracks(sheet: Sheet):
+    """Fig. 6."""
+    figure, axes = _axes("Fig. 6: error of Pre-DC on four tracks, 225 nodes", "time [s]", "RMS error over the runs [m]")
+    _lines(axes, sheet, TRACKS)
+    return figure
+
+
+def draw_particles(sheet: Sheet, name: str, number: int):
+    """Figs. 7-8, with two standard errors on either side."""
+    title = f"Fig. {number}: error of Pre-DC in {name}, 225 nodes (bars: two standard errors)"
+    figure, axes = _axes(title, "number of particles", f"RMS error in {name} [m]")
+    count, rms, error, _ = map(np.array, zip(*sheet.rows, strict=True))
+    axes.errorbar(count, rms, yerr=2 * error, color=PRE_DC, marker="o", markersize=4, capsize=3, linewidth=1.4)
+    axes.set_xscale("log")
+    axes.xaxis.set_major_formatter("{x:.0f}")
+    axes.set_ylim(bottom=0)
+    axes.annotate(f"{rms[-1]:.2f} m", (count[-1], rms[-1]), xytext=(0, 10), textcoords="offset points", ha="center")
+    return figure
+
+
+def _axes(title: str, x: str, y: str):
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.0, 4.2), layout="constrained")
+    axes = figure.subplots()
+    axes.set(title=title, xlabel=x, ylabel=y)
+    _tidy(axes)
+    return figure, axes
+
+
+def _tidy(axes) -> None:
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(alpha=0.25)
+
+
+def _lines(axes, sheet: Sheet, looks: dict) -> None:
+    """A line for every column but the first."""
+    time, *columns = (np.array(column, dtype=float) for column in zip(*sheet.rows, strict=True))
+    for values, (label, style) in zip(columns, looks.values(), strict=True):
+        axes.plot(time, values, label=label, linewidth=1.5, **style)
+    axes.set(xlim=(0, time[-1] + 1), ylim=(0, 1.25 * np.nanmax(columns)))
+    axes.legend(frameon=False, ncols=len(looks), loc="upper center")

@@ -1,0 +1,111 @@
+"""The systems of Xiang & Guo (2013) as trials, and everything that is played for the paper."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wsn_env.papers.rollout import Record, Trial, play_all
+from wsn_env.progress import Progress
+from wsn_env.scenario import Position, Scenario, Straight
+
+NODES = (81, 121, 169, 225)
+READING = dict(
+    motion=Straight(from_m=5.0, velocity_ms=0.9),
+    measurement=Position(noise_m=1.75),
+    filter_q=0.02,
+    particles=5000,
+    fusion="pooled",
+    search=False,
+)
+PARTICLES = (10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000)
+MOTIONS = ("straight", "sine", "circle", "turns")
+SAME_TRACKER = {"pre_dc": (), "centroid": (), "static_cluster": (), "nearest1": (("hysteresis_m", 0.0),)}
+
+
+@dataclass(frozen=True)
+class System:
+    """A (policy, tracker) pair of Table 2 and what it changes in the reading."""
+
+    policy: str
+    parameters: tuple[tuple[str, float], ...] = ()
+    changes: tuple[tuple[str, object], ...] = ()
+    runs_factor: int = 1  # so many times the runs of the others
+    heard_only: bool = False  # leave out periods without a report
+
+    def trial(self, nodes: int, runs: int) -> Trial:
+        """The system in the reading, in a field of so many nodes."""
+        scenario = scenario_as_read(nodes=nodes, **dict(self.changes))
+        return Trial(self.policy, scenario, runs * self.runs_factor, self.parameters)
+
+
+SYSTEMS = {
+    "static": System("all", changes=(("tracker", "snapshot"),), runs_factor=3, heard_only=True),
+    "ekf": System("nearest1", (("hysteresis_m", 0.0),), (("tracker", "ekf"), ("filter_q", 0.03))),
+    "pre_dc": System("pre_dc"),
+    "pre_dc_joint": System("pre_dc", changes=(("fusion", "joint"),)),
+}
+
+
+def scenario_as_read(**changes) -> Scenario:
+    """PreDC-v0 in our reading of the paper's experiment, with changes."""
+    return Scenario.named("PreDC-v0", **(READING | changes))
+
+
+def same_tracker_trial(policy: str, nodes: int, runs: int) -> Trial:
+    """A policy with the particle filter that all policies share."""
+    return Trial(policy, scenario_as_read(nodes=nodes), runs, SAME_TRACKER[policy])
+
+
+def particle_trial(particles: int, runs: int) -> Trial:
+    """Pre-DC with so many particles (Figs. 7-8)."""
+    return Trial("pre_dc", scenario_as_read(particles=particles), runs)
+
+
+def motion_trial(motion: str, runs: int, fitting: bool = True) -> Trial:
+    """Pre-DC on a track (Figs. 5-6).
+
+    Args:
+        fitting: with the q that fits the motion and a search for lost tracks; else as Table 2 is read, with
+            q = 0.02 and no search.
+    """
+    changes = dict(filter_q=None, search=True) if fitting else {}
+    return Trial("pre_dc", scenario_as_read(motion=motion, **changes), runs)
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """Everything that was played for the paper."""
+
+    runs: int
+    records: dict[Trial, Record]
+
+    def system(self, name: str, nodes: int = 225) -> Record:
+        """A system of Table 2."""
+        return self.records[SYSTEMS[name].trial(nodes, self.runs)]
+
+    def system_rms_m(self, name: str, nodes: int) -> np.ndarray:
+        """(R,) RMS of each run of a system of Table 2."""
+        return self.system(name, nodes).rms_m(SYSTEMS[name].heard_only)
+
+    def same_tracker(self, policy: str, nodes: int = 225) -> Record:
+        """A policy with the common tracker."""
+        return self.records[same_tracker_trial(policy, nodes, self.runs)]
+
+    def particles(self, count: int) -> Record:
+        """Pre-DC with so many particles."""
+        return self.records[particle_trial(count, self.runs)]
+
+    def motion(self, name: str, fitting: bool = True) -> Record:
+        """Pre-DC on a track."""
+        return self.records[motion_trial(name, self.runs, fitting)]
+
+
+def play_paper(runs: int, progress: Progress) -> Results:
+    """Play everything; trials that several tables share are played once."""
+    trials = [system.trial(nodes, runs) for nodes in NODES for system in SYSTEMS.values()]
+    trials += [same_tracker_trial(policy, nodes, runs) for nodes in NODES for policy in SAME_TRACKER]
+    trials += [motion_trial(motion, runs, fitting) for motion in MOTIONS for fitting in (True, False)]
+    trials += [particle_trial(count, runs) for count in PARTICLES]
+    return Results(runs, play_all(trials, progress))

@@ -1,0 +1,143 @@
+"""What every reproduction leaves: claims.csv, expected.csv, tables and pictures, and a summary on the terminal.
+
+Files are written under a temporary name and then renamed, so that a reader never meets half a file.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from wsn_env.evaluation import replacing
+
+HOLDS = "holds"
+UNDER_READING = "holds under a stated reading"
+NOT_REPRODUCED = "not reproduced"
+COLOURS = {HOLDS: "green", UNDER_READING: "yellow", NOT_REPRODUCED: "red"}
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim of the paper beside what we measured."""
+
+    claim: str
+    paper: str
+    ours: str
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """A figure known beforehand, with the absolute tolerance that it must be met with."""
+
+    quantity: str
+    expected: float
+    tolerance: float
+    measured: float
+
+    @property
+    def within(self) -> bool:
+        return abs(self.measured - self.expected) <= self.tolerance
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A table for a CSV file."""
+
+    columns: tuple[str, ...]
+    rows: list[Sequence[Any]]
+
+
+def verdict(plainly: bool, under_reading: bool) -> str:
+    """Judge a claim.
+
+    Args:
+        plainly: it holds even without the reading that favours it.
+        under_reading: it holds in the reading that the paper's module states.
+    """
+    if not under_reading:
+        return NOT_REPRODUCED
+    return HOLDS if plainly else UNDER_READING
+
+
+def prepare(out: Path) -> None:
+    """Make the folder, and see that pictures can be drawn, before time is spent.
+
+    Raises:
+        ValueError: when either cannot be.
+    """
+    if find_spec("matplotlib") is None:
+        raise ValueError("pictures need matplotlib: pip install 'wsn_env[plot]'")
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise ValueError(f"out = {str(out)!r}: cannot be made a folder: {problem}") from None
+
+
+def write_sheet(path: Path, sheet: Sheet) -> None:
+    """A table as CSV; numbers with six digits, None and NaN as an empty cell."""
+    with replacing(path) as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(sheet.columns)
+        table.writerows([_cell(value) for value in row] for row in sheet.rows)
+
+
+def write_claims(path: Path, claims: Iterable[Claim]) -> None:
+    """claims.csv: claim, paper, ours, verdict."""
+    rows = [(c.claim, c.paper, c.ours, c.verdict) for c in claims]
+    write_sheet(path, Sheet(("claim", "paper", "ours", "verdict"), rows))
+
+
+def write_expected(path: Path, expected: Iterable[Expectation]) -> None:
+    """expected.csv: quantity, expected, tolerance, measured, within."""
+    rows = [(e.quantity, e.expected, e.tolerance, e.measured, e.within) for e in expected]
+    write_sheet(path, Sheet(("quantity", "expected", "tolerance", "measured", "within"), rows))
+
+
+def write_picture(path: Path, figure) -> None:
+    """A matplotlib figure as PNG."""
+    with replacing(path, "wb") as file:
+        figure.savefig(file, format="png", dpi=150)
+
+
+def _cell(value) -> str:
+    if isinstance(value, (str, bool, int)):
+        return str(value)
+    return "" if value is None or value != value else f"{value:.6g}"
+
+
+def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], caption: str | None = None) -> None:
+    """A table on the terminal: the first column names, the others are figures."""
+    table = Table(title=escape(title), caption=escape(caption or ""), title_justify="left", caption_justify="left")
+    for i, column in enumerate(columns):
+        table.add_column(escape(column), justify="right" if i else "left")
+    for row in rows:
+        table.add_row(*map(escape, row))
+    Console().print(table)
+
+
+def print_claims(claims: Iterable[Claim]) -> None:
+    """The claims with their verdicts in colour."""
+    table = Table(title="Claims", title_justify="left", show_lines=True)
+    for column in ("claim", "paper", "ours", "verdict"):
+        table.add_column(column)
+    for c in claims:
+        table.add_row(escape(c.claim), escape(c.paper), escape(c.ours), f"[{COLOURS[c.verdict]}]{c.verdict}[/]")
+    Console().print(table)
+
+
+def print_expected(expected: Sequence[Expectation]) -> None:
+    """How many expected figures were met, and each that was not."""
+    missed = [e for e in expected if not e.within]
+    Console().print(f"Expected figures: {len(expected) - len(missed)} of {len(expected)} within their tolerance.")
+    for e in missed:
+        text = f"  missed: {e.quantity}: {e.measured:.4g}, expected {e.expected:.4g} +- {e.tolerance:.2g}"
+        Console().print(escape(text))
