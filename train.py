@@ -20,17 +20,18 @@ import tyro
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
+from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecMonitor
 
 from agents.ppo import PPOPolicy, network_of, save_policy
 from agents.sb3 import SB3VecEnv
-from wsn_env.cli import parse_overrides
-from wsn_env.evaluation import evaluate, forget_blocks, replacing, versions
+from wsn_env.cli import make_scenario
+from wsn_env.evaluation import evaluate, forget_blocks, versions
+from wsn_env.files import replacing
 from wsn_env.interface import Settings
 from wsn_env.policies import make_policy, policy_names
 from wsn_env.progress import progress_bar
 from wsn_env.reports import draw_front, print_tables
-from wsn_env.scenario import Scenario
 from wsn_env.vector_env import ClusterVectorEnv
 
 
@@ -82,7 +83,7 @@ class Training:
     network: tuple[int, int] = (64, 64)
     """Units of the two hidden layers."""
     seed: int = 0
-    """Of training, below 2^31 - rows; evaluation seeds lie above."""
+    """Of training, below 2^31 - steps - rows; evaluation seeds lie above."""
     torch_threads: int = 1
     """Cores for PPO's updates; more is slower as soon as anything else runs."""
     checkpoint_steps: int = 500_000
@@ -116,14 +117,14 @@ def main() -> int:
 
 def train(settings: Training) -> None:
     """The whole story."""
+    if not 0 <= settings.seed < 2**31 - settings.steps - settings.rows:
+        raise ValueError(f"--seed {settings.seed}: must be at least 0 and below 2^31 - steps - rows")
     torch.set_num_threads(settings.torch_threads)
-    scenario = make_scenario(settings)
+    scenario = make_scenario(settings.scenario, settings.set, settings.tracks, lam=settings.lam)
     speaks = Settings(reward=settings.reward, order=settings.order)
     folder = open_folder(settings)
 
-    envs = ClusterVectorEnv(
-        settings.rows, scenario, reward=speaks.reward, order=speaks.order, autoreset_mode="Disabled"
-    )
+    envs = ClusterVectorEnv(settings.rows, scenario, autoreset_mode="Disabled", **asdict(speaks))
     adapted = SB3VecEnv(envs, lam_scale=0.3, stagger=True)
     model = make_model(settings, VecMonitor(adapted), folder)
     left = settings.steps - model.num_timesteps
@@ -149,14 +150,6 @@ def train(settings: Training) -> None:
         compare(settings, scenario, policy)
 
 
-def make_scenario(settings: Training) -> Scenario:
-    """The scenario with its overrides."""
-    scenario = Scenario.named(settings.scenario, lam=settings.lam, **parse_overrides(settings.set))
-    if settings.tracks:
-        scenario = scenario.override(motion="recorded", tracks=tuple(map(str, settings.tracks)))
-    return scenario
-
-
 def open_folder(settings: Training) -> Path:
     """The run's folder with config.json; an existing run is only touched by --resume, with the same settings."""
     folder = settings.folder
@@ -171,8 +164,8 @@ def open_folder(settings: Training) -> Path:
             name = differing[0]
             raise ValueError(f"{folder} was begun with {name} = {old.get(name)!r}: cannot resume it with {new[name]!r}")
     folder.mkdir(parents=True, exist_ok=True)
-    with replacing(path) as file:
-        json.dump(plain(settings), file, indent=1)
+    with replacing(path) as temporary:
+        temporary.write_text(json.dumps(plain(settings), indent=1))
     return folder
 
 
@@ -189,7 +182,7 @@ def make_model(settings: Training, envs, folder: Path) -> PPO:
             model = PPO.load(path, env=envs)
         except Exception as problem:  # zipfile, pickle and torch raise all kinds for a damaged file
             raise ValueError(f"{path} is cut short or no checkpoint: remove it to begin anew ({problem!r})") from None
-        envs.seed(settings.seed + 1_000_003 * (1 + model.num_timesteps % 1000))
+        envs.seed(settings.seed + model.num_timesteps)  # other episodes than before
         return model
     return PPO(
         "MlpPolicy",
@@ -197,7 +190,7 @@ def make_model(settings: Training, envs, folder: Path) -> PPO:
         n_steps=settings.rollout,
         batch_size=settings.batch,
         n_epochs=settings.epochs,
-        learning_rate=Falling(settings.learning_rate),
+        learning_rate=LinearSchedule(settings.learning_rate, 0.0, 1.0),
         gamma=settings.gamma,
         gae_lambda=settings.gae_lambda,
         ent_coef=settings.entropy,
@@ -207,21 +200,10 @@ def make_model(settings: Training, envs, folder: Path) -> PPO:
     )
 
 
-@dataclass
-class Falling:
-    """Learning rate that falls linearly to 0."""
-
-    start: float
-
-    def __call__(self, remaining: float) -> float:
-        return self.start * remaining
-
-
 def save_checkpoint(model: PPO, folder: Path) -> None:
     """Whole or not at all."""
-    temporary = folder / ".checkpoint.zip"
-    model.save(temporary)
-    temporary.replace(folder / "checkpoint.zip")
+    with replacing(folder / "checkpoint.zip") as path, open(path, "wb") as file:
+        model.save(file)
 
 
 class Watch(BaseCallback):
@@ -231,14 +213,14 @@ class Watch(BaseCallback):
         super().__init__()
         self._settings, self._folder, self._report = settings, folder, report
         self._saved = 0
-        self._rms = deque([float("nan")], maxlen=200)
+        self._rms: deque[float] = deque(maxlen=200)
 
     def _on_step(self) -> bool:
         self._rms.extend(info["episode_rms_m"] for info in self.locals["infos"] if "episode_rms_m" in info)
         return True
 
     def _on_rollout_end(self) -> None:
-        rms = float(np.nanmean(self._rms)) if len(self._rms) > 1 else float("nan")
+        rms = float(np.mean(self._rms)) if self._rms else float("nan")
         self.logger.record("rollout/episode_rms_m", rms)
         self._report(min(self.num_timesteps, self._settings.steps), self._settings.steps, f"training, RMS {rms:.2f} m")
         if self.num_timesteps - self._saved >= self._settings.checkpoint_steps:
@@ -246,7 +228,7 @@ class Watch(BaseCallback):
             self._saved = self.num_timesteps
 
 
-def compare(settings: Training, scenario: Scenario, policy: Path) -> None:
+def compare(settings: Training, scenario, policy: Path) -> None:
     """Paired comparison with every baseline at the trained lam: table, CSV, JSON, picture."""
     folder = settings.folder
     policies = {"ppo": PPOPolicy(scenario, path=str(policy))}

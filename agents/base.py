@@ -30,12 +30,15 @@ class ViewPolicy:
 
         Returns: the action (a dict, or a list of dicts for a vector environment), and `state` as given.
         """
-        cluster = self.act(View.from_arrays(observation))
+        view = View.from_arrays(observation)
+        cluster = self.act(view)
         nodes = np.asarray(observation["battery"]).shape[-1]
         chosen = np.zeros((len(cluster.head), nodes), dtype=np.int64)
         rows, slots = np.nonzero(cluster.members >= 0)
         chosen[rows, cluster.members[rows, slots]] = 1
-        heads = np.maximum(cluster.head, 0)
+        heads = np.where(cluster.head < 0, view.head, cluster.head)  # -1 keeps the head; before there is one
+        heads = np.where(heads < 0, view.nearest_living(), heads)  # the world takes the nearest living node
+        heads = np.maximum(heads, 0)
         actions = [{"head": np.int64(head), "members": row} for head, row in zip(heads, chosen)]
         return (actions[0] if np.ndim(observation["battery"]) == 1 else actions), state
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -9,16 +10,22 @@ from pathlib import Path
 
 from agents.base import ViewPolicy
 from agents.network import Network
+from wsn_env.files import replacing
 from wsn_env.interface import Interface, Settings
 from wsn_env.types import Cluster
 from wsn_env.view import View
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PPOPolicy(ViewPolicy):
     """Takes the most probable action of the network that `train.py` saved at `path` (a policy.json)."""
 
     path: str = "policy.json"
+
+    def __repr__(self):
+        """Tells it from others by what it has learned."""
+        weights = b"".join(array.tobytes() for layer in self._parts[1].layers for array in layer)
+        return f"PPOPolicy({self.path!r}, weights {hashlib.sha256(weights).hexdigest()[:16]})"
 
     @cached_property
     def _parts(self) -> tuple[Interface, Network]:
@@ -55,13 +62,10 @@ def save_policy(folder: str | Path, network: Network, settings: Settings, facts:
     Returns: path of policy.json.
     """
     folder = Path(folder)
-    temporary = folder / ".policy.safetensors"
-    network.save(temporary)
-    temporary.replace(folder / "policy.safetensors")
-    text = json.dumps({"kind": "ppo", "interface": asdict(settings)} | facts, indent=1)
-    temporary = folder / ".policy.json"
-    temporary.write_text(text)
-    temporary.replace(folder / "policy.json")
+    with replacing(folder / "policy.safetensors") as path:
+        network.save(path)
+    with replacing(folder / "policy.json") as path:
+        path.write_text(json.dumps({"kind": "ppo", "interface": asdict(settings)} | facts, indent=1))
     return folder / "policy.json"
 
 

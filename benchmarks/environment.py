@@ -26,7 +26,7 @@ from rich.table import Table
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for `python benchmarks/environment.py`
 
 from benchmarks.naive import BookFilter, NaiveEnv, ParticleFilter
-from wsn_env.evaluation import replacing
+from wsn_env.files import replacing
 from wsn_env.scenario import Scenario
 from wsn_env.trackers.kernels import filter_rows
 from wsn_env.types import State
@@ -279,8 +279,8 @@ def main() -> None:
     if arguments.json:
         machine = {"python": platform.python_version(), "numpy": np.__version__, "processor": platform.machine()}
         figures = {"seconds_per_step": seconds, "vector_over": ratios, "claimed": AT_LEAST, "agreement": checks}
-        with replacing(arguments.json) as file:
-            json.dump(figures | {"machine": machine}, file, indent=2)
+        with replacing(arguments.json) as path:
+            path.write_text(json.dumps(figures | {"machine": machine}, indent=2))
 
 
 if __name__ == "__main__":

@@ -13,15 +13,19 @@ from filterpy.monte_carlo import systematic_resample
 from wsn_env.scenario import Scenario
 
 
+def constant_velocity(t: float) -> tuple[np.ndarray, np.ndarray]:
+    """F (4, 4) and G (4, 2) of eqs. 6, 8."""
+    transition = np.array([[1, t, 0, 0], [0, 1, 0, 0], [0, 0, 1, t], [0, 0, 0, 1]])
+    return transition, np.array([[t * t / 2, 0], [t, 0], [0, t * t / 2], [0, t]])
+
+
 class ParticleFilter:
     """A bootstrap filter over particles (P, 4) = x, vx, y, vy [m, m/s]."""
 
     def __init__(self, particles: np.ndarray, period_s: float, q: float, noise_m: float, rng: np.random.Generator):
-        t = period_s
         self.particles = particles
         self.weights = np.full(len(particles), 1 / len(particles))
-        self.transition = np.array([[1, t, 0, 0], [0, 1, 0, 0], [0, 0, 1, t], [0, 0, 0, 1]])
-        self.noise_gain = np.array([[t * t / 2, 0], [t, 0], [0, t * t / 2], [0, t]])
+        self.transition, self.noise_gain = constant_velocity(period_s)
         self.q, self.noise_m, self.rng = q, noise_m, rng
 
     def predict(self) -> None:
@@ -95,7 +99,8 @@ class NaiveEnv:
         self.positions = self.rng.uniform(0, s.field.side_m, (s.field.nodes, 2))
         self.battery = np.full(s.field.nodes, s.radio.battery_j)
         self.period, self.head, self.members = 0, None, []
-        self.target = self._draw_target()
+        self.track = self._draw_track()
+        self.target = self.track[0]
         sds = np.array([s.tracking.start_sd_m, s.tracking.start_sd_ms] * 2)
         mean = self.target + sds * self.rng.normal(size=4)
         particles = mean + sds * self.rng.normal(size=(s.tracking.particles, 4))
@@ -108,7 +113,7 @@ class NaiveEnv:
         s = self.scenario
         self.energy = 0.0
         self._form(self._nearest(1 + action))
-        self._move_target()
+        self.target = self.track[self.period + 1]
         reports = self._collect_reports()
         self.filter.predict()
         self.filter.weigh(reports)
@@ -122,8 +127,8 @@ class NaiveEnv:
         info = {"error_m": error, "energy_mj": energy_mj}
         return self._observe(), -(error + s.lam * energy_mj), False, self.period >= s.periods, info
 
-    def _draw_target(self) -> np.ndarray:
-        """The crossing's start and velocity."""
+    def _draw_track(self) -> np.ndarray:
+        """The crossing (periods + 1, 4): the first that stays in the field."""
         s = self.scenario
         low, high = s.motion.margin_m, s.field.side_m - s.motion.margin_m
         while True:
@@ -131,16 +136,15 @@ class NaiveEnv:
             if np.linalg.norm(end - start) >= s.motion.crossing_m:
                 break
         velocity = (end - start) / (s.periods * s.period_s)
-        return np.array([start[0], velocity[0], start[1], velocity[1]])
-
-    def _move_target(self) -> None:
-        acceleration = self.rng.normal(0, self.scenario.motion.acceleration_ms2, 2)
-        self.target = self.filter.transition @ self.target + self.filter.noise_gain @ acceleration
-        side = self.scenario.field.side_m
-        for axis in (0, 2):  # the border is a mirror
-            if not 0 <= self.target[axis] <= side:
-                self.target[axis] = -self.target[axis] if self.target[axis] < 0 else 2 * side - self.target[axis]
-                self.target[axis + 1] = -self.target[axis + 1]
+        transition, noise_gain = constant_velocity(s.period_s)
+        while True:
+            track = [np.array([start[0], velocity[0], start[1], velocity[1]])]
+            for _ in range(s.periods):
+                acceleration = self.rng.normal(0, s.motion.acceleration_ms2, 2)
+                track.append(transition @ track[-1] + noise_gain @ acceleration)
+            track = np.array(track)
+            if track[:, [0, 2]].min() >= 0 and track[:, [0, 2]].max() <= s.field.side_m:
+                return track
 
     def _nearest(self, count: int) -> list[int]:
         predicted = (self.filter.transition @ self.mean)[[0, 2]]

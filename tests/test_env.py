@@ -65,13 +65,14 @@ def test_import_is_light():
     assert answer.stdout.strip() == "[]"
 
 
+@pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("mode", list(AutoresetMode))
 @pytest.mark.parametrize("observation", OBSERVATIONS)
-def test_vector_equals_single_environments(mode, observation):
-    """Observations, rewards, flags, infos and final observations, over several episodes, to the bit."""
-    rows = 10  # above the number that one thread keeps to itself
+def test_vector_equals_single_environments(mode, observation, threads):
+    """64 rows: observations, rewards, flags, infos and final observations, over several episodes, to the bit."""
+    rows = 64
     settings = dict(observation=observation, lam=(0.5, 8.0), radius_m=6.0, packet_success=0.7, **SMALL)
-    native = ClusterVectorEnv(rows, autoreset_mode=mode, threads=2, **settings)
+    native = ClusterVectorEnv(rows, autoreset_mode=mode, threads=threads, **settings)
     single = SyncVectorEnv([lambda: ClusterEnv(**settings)] * rows, autoreset_mode=mode)
     native.action_space.seed(1)
     pair = native.reset(seed=5), single.reset(seed=5)
@@ -248,6 +249,13 @@ def test_bad_actions_name_the_space(action, bad):
     envs.reset(seed=0)
     with pytest.raises(ValueError, match="not in"):
         envs.step(np.stack([bad, bad]))
+
+
+def test_actions_are_whole_numbers():
+    envs = ClusterVectorEnv(2, **SMALL)
+    envs.reset(seed=0)
+    with pytest.raises(ValueError, match="not in"):
+        envs.step(np.array([3.7, 2.2]))
 
 
 def test_stepping_at_the_wrong_time_says_reset():

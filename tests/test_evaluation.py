@@ -87,7 +87,7 @@ def test_files_hold_rows_and_settings(evaluation, tmp_path):
     assert len(saved["means"]) == 6
     one = next(m for m in saved["means"] if m["policy"] == "nearest0" and m["lam"] == 10.0)
     difference = evaluation.values("nearest0", 10.0, "return") - evaluation.values("pre_dc", 10.0, "return")
-    assert one["return_difference"]["mean"] == pytest.approx(difference.mean())
+    assert one["return_minus_pre_dc"]["mean"] == pytest.approx(difference.mean())
 
 
 def test_a_stopped_run_continues_where_it_was(tmp_path, monkeypatch):
@@ -131,3 +131,19 @@ def test_a_policy_of_ones_own_needs_no_name():
     )
     assert (evaluation.values("mine", 2.0, "return") == evaluation.values("nearest0", 2.0, "return")).all()
     assert evaluation.difference("mine", "nearest0", 2.0) == Summary(0.0, 0.0, 0.0)
+
+
+def test_kept_blocks_belong_to_their_policy(tmp_path):
+    """Another policy under the same name does not get the rows of the one before."""
+    one, other = (make_policy(name, SCENARIO) for name in ("nearest0", "nearest4"))
+    first = evaluate({"mine": one}, SCENARIO, [1.0], episodes=4, keep=tmp_path)
+    second = evaluate({"mine": other}, SCENARIO, [1.0], episodes=4, keep=tmp_path)
+    assert second.rows == evaluate({"mine": other}, SCENARIO, [1.0], episodes=4).rows != first.rows
+
+
+def test_repeated_and_missing_lams():
+    assert len(evaluate(["nearest0"], SCENARIO, [4.0, 4.0], episodes=3).values("nearest0", 4.0, "return")) == 3
+    with pytest.raises(ValueError, match="name the lams"):
+        evaluate(["nearest0"], SCENARIO.override(lam=(1.0, 2.0)), episodes=3)
+    with pytest.raises(ValueError, match="at least one"):
+        evaluate([], SCENARIO, [1.0])

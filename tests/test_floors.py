@@ -12,6 +12,7 @@ FLOORS = {
     "wsn_env.types": 0,
     "wsn_env.registration": 0,
     "wsn_env.progress": 0,
+    "wsn_env.files": 0,
     "wsn_env.scenario": 1,
     "wsn_env.numerics": 1,
     "wsn_env.draws": 1,

@@ -20,8 +20,8 @@ from wsn_env import Scenario, View, World, draws, make_policy
 HERE = Path(__file__).parents[1]
 ROWS = 8
 GOLDEN = {
-    "PreDC-v0": "71f2e281876d897ad8e76209c51572c7d2caba6e5fe2dfdfe2cb263f988b2f0f",
-    "Rssi-v0": "e168fe1cc57142eb9d28d4f00ecee3adc21af403b9ee2df7c414d6ca2e31115b",
+    "PreDC-v0": "9b4ad92618d510edb474147760f99a8ba0e7a569658939b438299017ad7b9aba",
+    "Rssi-v0": "dea0a973a53febe95528961b440878665dd9927e8ed6ac5ae655fb3d2f708481",
 }
 
 

@@ -76,6 +76,12 @@ def test_the_crossings_noise_is_white_acceleration():
     np.testing.assert_allclose(np.diff(track[inside][:, :, ::2], axis=1), middle, atol=1e-9)
 
 
+def test_crossings_never_bounce():
+    """Their velocity changes by noise only: no episode turns at the border."""
+    velocity = tracks(1000)[:, :, 1::2]
+    assert np.abs(np.diff(velocity, axis=1)).max() < 6 * 0.025
+
+
 def test_the_straight_diagonal():
     track = tracks(1, motion="straight")[0]
     np.testing.assert_allclose(track[:, 0], 5 + 0.9 * np.arange(101), atol=1e-12)

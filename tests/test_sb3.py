@@ -8,9 +8,10 @@ from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import DummyVecEnv, VecFrameStack
 
+from agents.base import ViewPolicy
 from agents.sb3 import SB3VecEnv
 from tests.test_env import same
-from wsn_env import ClusterEnv, ClusterVectorEnv, Scenario, make_policy
+from wsn_env import Cluster, ClusterEnv, ClusterVectorEnv, Scenario, make_policy
 from wsn_env.evaluation import evaluate
 from wsn_env.policies import policy_names
 
@@ -103,3 +104,17 @@ def test_predict_takes_one_environment_or_many():
     actions, _ = policy.predict(many)
     assert len(actions) == 3 and same(actions[0], action)
     envs.step(actions)
+
+
+def test_predict_keeps_the_head_where_a_policy_says_so():
+    class Keep(ViewPolicy):
+        def act(self, view):
+            return Cluster(np.full(len(view.head), -1), np.full((len(view.head), 0), -1))
+
+    env = ClusterEnv(action="cluster", observation="view", **SMALL)
+    observation, _ = env.reset(seed=0)
+    for nearest_first in (True, False):
+        action, _ = Keep(env.scenario).predict(observation)
+        order = np.hypot(*(observation["positions"] - observation["predicted_mean"][::2]).T).argsort()
+        assert action["head"] == (order[0] if nearest_first else observation["head"])
+        observation, *_ = env.step({"head": order[5], "members": np.zeros(30, int)})

@@ -219,3 +219,8 @@ def test_as_dict_goes_into_json():
     plain = json.loads(json.dumps(scenario.as_dict()))
     assert plain["measurement"] == {"kind": "Rssi"} | dataclasses.asdict(scenario.measurement)
     assert plain["field"]["nodes"] == 7
+
+
+def test_positions_can_be_changed_again():
+    two = Scenario.named("PreDC-v0", positions=((1, 1), (2, 2)))
+    assert two.override(positions=((1, 1), (2, 2), (3, 3))).field.nodes == 3

@@ -14,6 +14,7 @@ import train
 from agents.network import Network
 from agents.ppo import PPOPolicy, network_of
 from wsn_env import ClusterVectorEnv, Scenario, View, make_policy
+from wsn_env.cli import parse_overrides
 
 SET = ["particles=50", "nodes=40", "side_m=50", "crossing_m=20", "periods=10"]
 SHORT = dict(steps=4096, rows=32, rollout=32, batch=512, epochs=2, episodes=60, checkpoint_steps=1024, set=SET)
@@ -44,7 +45,7 @@ def test_the_saved_policy_is_the_trained_one_without_torch(run):
     model = PPO.load(run / "checkpoint.zip")
     network = Network.load(run / "policy.safetensors")
     assert all(np.array_equal(a, b) for x, y in zip(network.layers, network_of(model).layers) for a, b in zip(x, y))
-    scenario = Scenario.named("PreDC-v0", **train.parse_overrides(SET))
+    scenario = Scenario.named("PreDC-v0", **parse_overrides(SET))
     envs = ClusterVectorEnv(16, scenario)
     observation, _ = envs.reset(seed=0)
     with torch.no_grad():
@@ -99,7 +100,7 @@ def test_damaged_files_say_so(run, tmp_path):
     checkpoint.write_bytes(checkpoint.read_bytes()[: checkpoint.stat().st_size // 2])
     with pytest.raises(ValueError, match="cut short"):
         train.train(train.Training(name="short", runs=runs, resume=True, **SHORT))
-    scenario = Scenario.named("PreDC-v0", **train.parse_overrides(SET))
+    scenario = Scenario.named("PreDC-v0", **parse_overrides(SET))
     weights = runs / "short" / "policy.safetensors"
     weights.write_bytes(weights.read_bytes()[:-100])
     view = View.of(ClusterVectorEnv(2, scenario).world.reset([0, 1]))

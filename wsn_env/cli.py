@@ -50,16 +50,14 @@ class Reproduce:
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; bad input is one line on stderr and exit status 2, Ctrl-C is 130."""
     commands = {"evaluate": Evaluate, "reproduce": Reproduce}
-    command = tyro.extras.subcommand_cli_from_dict(
-        {name: kind for name, kind in commands.items()}, prog="wsn", args=arguments
-    )
+    command = tyro.extras.subcommand_cli_from_dict(commands, prog="wsn", args=arguments)
     try:
         run_evaluate(command) if isinstance(command, Evaluate) else run_reproduce(command)
     except ValueError as problem:
         print(f"wsn: {problem}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("wsn: stopped; what was finished is kept, the same command continues", file=sys.stderr)
+        print("wsn: stopped; evaluate --out continues where it was", file=sys.stderr)
         return 130
     return 0
 
@@ -69,9 +67,7 @@ def run_evaluate(command: Evaluate) -> None:
     from wsn_env.evaluation import evaluate, forget_blocks
     from wsn_env.reports import print_tables
 
-    scenario = Scenario.named(command.scenario, **parse_overrides(command.set))
-    if command.tracks:
-        scenario = scenario.override(motion="recorded", tracks=tuple(map(str, command.tracks)))
+    scenario = make_scenario(command.scenario, command.set, command.tracks)
     with progress_bar() as report:
         evaluation = evaluate(
             command.policies,
@@ -94,6 +90,12 @@ def run_reproduce(command: Reproduce) -> None:
     from wsn_env.papers import reproduce
 
     reproduce(command.paper, command.out, command.runs)
+
+
+def make_scenario(name: str, pairs: list[str], tracks: list[Path], **further) -> Scenario:
+    """A scenario from the options --scenario, --set and --tracks; `further` quantities win."""
+    recorded = {"motion": "recorded", "tracks": tuple(map(str, tracks))} if tracks else {}
+    return Scenario.named(name, **parse_overrides(pairs) | recorded | further)
 
 
 def parse_overrides(pairs: list[str]) -> dict:

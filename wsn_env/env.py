@@ -25,7 +25,11 @@ def resolve(scenario: str | Scenario, overrides: dict[str, Any]) -> Scenario:
 
 
 def measures(outcome: Outcome, state: State, reward: np.ndarray) -> dict[str, np.ndarray]:
-    """The info of a period, (B, ...) each. It carries truth: for loggers only, never for policies."""
+    """The info of a period, (B, ...) each. It carries truth: for loggers only, never for policies.
+
+    Args:
+        reward: (B,) of the period; its two parts are told apart here.
+    """
     energy_mj = outcome.energy_mj
     cost = state.lam * energy_mj
     return {
@@ -93,7 +97,7 @@ class ClusterEnv(gym.Env):
         key = draws.episode_key(self.np_random)
         self._state, outcome = self.world.restart(empty, [True], np.array([key]), donate=True)
         self._squares = 0.0
-        return self._observe(), _first(measures(outcome, self._state, -outcome.error_m))
+        return self._observe(), _first(measures(outcome, self._state, self.interface.reward(outcome, self._state.lam)))
 
     def step(self, action):
         """One period. Returns observation, reward, terminated (never), truncated, info."""

@@ -10,7 +10,6 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
-import os
 import platform
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -20,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from wsn_env import draws
+from wsn_env.files import replacing
 from wsn_env.policies import Policy, make_policy
 from wsn_env.progress import Progress
 from wsn_env.scenario import Scenario
@@ -86,19 +86,19 @@ class Evaluation:
         """Write evaluation.csv and evaluation.json into a folder, each whole or not at all."""
         out = Path(out)
         out.mkdir(parents=True, exist_ok=True)
-        with replacing(out / "evaluation.csv") as file:
+        with replacing(out / "evaluation.csv") as path, open(path, "w", newline="") as file:
             writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
             writer.writeheader()
             writer.writerows(self.rows)
         means = [
             {"policy": policy, "lam": lam}
             | {column: vars(value) for column, value in self.summary(policy, lam).items()}
-            | {"return_difference": vars(self.difference(policy, self.policies[0], lam))}
+            | {f"return_minus_{self.policies[0]}": vars(self.difference(policy, self.policies[0], lam))}
             for lam in self.lams
             for policy in self.policies
         ]
-        with replacing(out / "evaluation.json") as file:
-            json.dump(self.settings() | {"versions": versions(), "means": means}, file, indent=1)
+        with replacing(out / "evaluation.json") as path:
+            path.write_text(json.dumps(self.settings() | {"versions": versions(), "means": means}, indent=1))
 
     def settings(self) -> dict:
         """What was asked for."""
@@ -183,11 +183,15 @@ def evaluate(
     Raises:
         ValueError: for an unknown policy, or seed and episodes out of range.
     """
-    lams = tuple(float(lam) for lam in (lams if lams is not None else [scenario.lam]))
+    if lams is None and isinstance(scenario.lam, (tuple, list)):
+        raise ValueError(f"scenario.lam = {scenario.lam}: name the lams to compare at, one number each")
+    lams = tuple(dict.fromkeys(map(float, [scenario.lam] if lams is None else lams)))
+    if not policies or not lams:
+        raise ValueError("policies and lams must name at least one each")
     named = policies if isinstance(policies, dict) else {name: make_policy(name, scenario) for name in policies}
     seeds = evaluation_seeds(seed, episodes)
     blocks = [seeds[i : i + BLOCK] for i in range(0, episodes, BLOCK)]
-    kept = _Kept(keep, _settings(scenario, named, lams, episodes, seed))
+    kept = _Kept(keep, _settings(scenario, named, lams, episodes, seed) | {"choosers": list(map(repr, named.values()))})
     rows: list[dict] = []
     done, total = 0, len(lams) * len(named) * len(blocks)
     for lam in lams:
@@ -214,7 +218,10 @@ def evaluate(
 
 
 class _Kept:
-    """Finished blocks in a JSON-lines file; one of other settings is not read but begun anew."""
+    """Finished blocks in a JSON-lines file; one of other settings or policies is not read but begun anew.
+
+    A policy is known by its repr, which for a dataclass shows its parameters.
+    """
 
     def __init__(self, folder: str | Path | None, settings: dict):
         self._blocks: dict[tuple, list[dict]] = {}
@@ -231,10 +238,9 @@ class _Kept:
                     continue  # cut short when the run was killed
                 self._blocks[name, lam, number] = measured
         self._path.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(self._path) as file:
-            file.write(json.dumps(head) + "\n")
-            for key, measured in self._blocks.items():
-                file.write(json.dumps([*key, measured]) + "\n")
+        kept = [[*key, measured] for key, measured in self._blocks.items()]
+        with replacing(self._path) as path:
+            path.write_text("".join(json.dumps(line) + "\n" for line in [head, *kept]))
 
     def get(self, name: str, lam: float, number: int) -> list[dict] | None:
         return self._blocks.get((name, lam, number))
@@ -253,26 +259,6 @@ class _Kept:
 def forget_blocks(folder: str | Path) -> None:
     """Remove the kept blocks of a finished run."""
     _Kept.forget(folder)
-
-
-class replacing:  # noqa: N801 - a context manager used like open()
-    """Open a file for writing under a temporary name and rename it at the end: whole or not at all."""
-
-    def __init__(self, path: str | Path, mode: str = "w"):
-        self._path = Path(path)
-        self._temporary = self._path.with_name(f".{self._path.name}.{os.getpid()}")
-        self._mode = mode
-
-    def __enter__(self):
-        self._file = open(self._temporary, self._mode, newline="" if "b" not in self._mode else None)
-        return self._file
-
-    def __exit__(self, kind, problem, trace):
-        self._file.close()
-        if kind is None:
-            os.replace(self._temporary, self._path)
-        else:
-            self._temporary.unlink(missing_ok=True)
 
 
 def versions() -> dict[str, str]:

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from wsn_env.evaluation import Evaluation, replacing
+from wsn_env.evaluation import Evaluation
+from wsn_env.files import replacing
 
 EMPHASIS, FAMILY, OTHER = "#D55E00", "#0072B2", "#333333"
-HEADER = ("policy", "return", "difference to {}", "RMS m", "energy mJ/period", "awake", "lost")
+HEADER = ("policy", "return", "{} minus it", "RMS m", "energy mJ/period", "awake", "lost")
 
 
 def table_rows(evaluation: Evaluation, lam: float, reference: str) -> list[tuple[str, ...]]:
-    """Best return first; means with 95 % intervals, and paired differences of the return."""
+    """Best return first; means with 95 % intervals, and the paired difference of the reference's return minus each."""
     rows = []
     for policy in evaluation.policies:
         s = evaluation.summary(policy, lam)
-        difference = "" if policy == reference else _interval(evaluation.difference(policy, reference, lam), 2, "+")
+        difference = "" if policy == reference else _interval(evaluation.difference(reference, policy, lam), 2, "+")
         rows.append(
             (
                 s["return"].mean,
@@ -48,7 +49,9 @@ def print_tables(evaluation: Evaluation, reference: str | None = None, console=N
         console = Console(width=140)
     for lam in evaluation.lams:
         title = f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes"
-        table = Table(title=title, caption="means, 95 % bootstrap intervals; difference of returns, paired")
+        table = Table(
+            title=title, caption=f"means, 95 % bootstrap intervals; {reference} minus it: paired difference of returns"
+        )
         for name in HEADER:
             table.add_column(name.format(reference), justify="left" if name == "policy" else "right")
         for row in table_rows(evaluation, lam, reference):
@@ -102,8 +105,8 @@ def draw_front(evaluation: Evaluation, lam: float, path: str | Path, emphasis: s
     axes.set_ylabel("mean error [m]")
     axes.set_title(f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes")
     axes.grid(alpha=0.3)
-    with replacing(path, "wb") as file:
-        figure.savefig(file, dpi=140, format="png")
+    with replacing(path) as temporary:
+        figure.savefig(temporary, dpi=140, format="png")
     plt.close(figure)
 
 

@@ -115,7 +115,11 @@ class Motion(Section):
 
 @dataclass(frozen=True)
 class Crossing(Motion):
-    """Straight between two uniform points of the inner field, in the horizon's time (the training default)."""
+    """Towards a uniform point of the inner field from another, in the horizon's time, but for noise (the default).
+
+    The noise is drawn until the whole track lies in the field: a mirror at the border would turn the velocity in an
+    instant, which no filter with this q can follow.
+    """
 
     fitting_q: ClassVar[float] = 0.05
     margin_m: float = quantity(10.0, "end points keep this distance from the border", at_least=0)
@@ -389,7 +393,8 @@ class Scenario(Section):
         Sections are given whole or, for motion and measurement, by name: `override(nodes=400, motion="sine",
         amplitude_m=20, tracker="ekf")`. An unknown keyword raises and suggests.
         """
-        changes = {name: value for name, value in changes.items()}
+        if changes.get("positions") is not None:
+            changes.setdefault("nodes", Field.nodes)  # the positions tell how many
         whole = {}
         for name, kinds in (("motion", MOTIONS), ("measurement", MEASUREMENTS)):
             if isinstance(changes.get(name), str):

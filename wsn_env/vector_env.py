@@ -74,9 +74,10 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             seed: an int seeds row i with seed + i; a list seeds each row, None leaves its generator going.
         """
         rows = self._rows_to_reset(options)
-        seeds = (
-            [None if seed is None else seed + i for i in range(self.num_envs)] if not isinstance(seed, list) else seed
-        )
+        if seed is None or isinstance(seed, int):
+            seeds = [None if seed is None else seed + i for i in range(self.num_envs)]
+        else:
+            seeds = list(seed)
         if len(seeds) != self.num_envs:
             raise ValueError(f"seed has {len(seeds)} entries: must have one for each of the {self.num_envs} rows")
         for i in np.flatnonzero(rows):
@@ -85,7 +86,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         if self._state is None:
             self._state = self.world.reset(np.zeros(self.num_envs, np.uint64))
         outcome = self._restart(rows)
-        info = measures(outcome, self._state, -outcome.error_m)
+        info = self._measures(outcome)
         return self._observe(), _masked(info, rows)
 
     def _rows_to_reset(self, options) -> np.ndarray:
@@ -126,7 +127,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         if anew.any():  # next-step mode: these rows only begin
             reward[anew] = 0.0
             first = self._restart(anew)
-            _overwrite(info, measures(first, self._state, -first.error_m), anew)
+            _overwrite(info, self._measures(first), anew)
         truncated = self._state.period >= self.scenario.periods
         terminated = np.zeros(self.num_envs, dtype=bool)
         ends = {"episode_rms_m": np.sqrt(self._squares / self.scenario.periods)}
@@ -147,7 +148,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         infos = {"final_obs": final, "_final_obs": truncated.copy()}
         infos |= {"final_info": _masked(info | ends, truncated), "_final_info": truncated.copy()}
         first = self._restart(truncated)
-        _overwrite(info, measures(first, self._state, -first.error_m), truncated)
+        _overwrite(info, self._measures(first), truncated)
         infos |= _masked(info, np.ones(self.num_envs, dtype=bool))
         return self._observe(), reward, terminated, truncated, infos
 
@@ -167,13 +168,18 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             return None
         return tuple(frame(self._state, self.scenario, row) for row in range(self.num_envs))
 
+    def _measures(self, outcome):
+        return measures(outcome, self._state, self.interface.reward(outcome, self._state.lam))
+
     def _checked(self, actions):
         if isinstance(actions, (list, tuple)) and isinstance(actions[0], dict):  # as policies' predict() gives them
             actions = {name: np.stack([one[name] for one in actions]) for name in actions[0]}
         if isinstance(actions, dict):
             actions = {name: np.asarray(value) for name, value in actions.items()}
         else:
-            actions = np.asarray(actions, dtype=self.action_space.dtype)
+            actions = np.asarray(actions)
+            if actions.dtype.kind in "iu":
+                actions = actions.astype(self.action_space.dtype, copy=False)
         if not self.action_space.contains(actions):
             raise ValueError(f"actions {actions!r} are not in {self.action_space}")
         return actions

@@ -97,7 +97,7 @@ class World:
         self.tracker.relocate(state.key, state.period, found, state.belief)
 
     def _over_rows(self, kernel, *arguments) -> None:
-        over_rows(kernel, len(arguments[0]), self.threads, self._constants, *arguments)
+        over_rows(kernel, len(arguments[0]), self.threads, self._constants, *arguments)  # all lead with B
 
 
 def _choice(cluster: Cluster, state: State) -> tuple[np.ndarray, np.ndarray]:

@@ -4,10 +4,8 @@ from dataclasses import dataclass
 
 from wsn_env.interface.actions import make_action
 from wsn_env.interface.observations import make_observation
-from wsn_env.interface.rewards import REWARDS, make_reward
+from wsn_env.interface.rewards import make_reward
 from wsn_env.scenario import Scenario
-
-CANDIDATES = 12
 
 
 @dataclass(frozen=True)
@@ -18,7 +16,7 @@ class Settings:
     observation: str = "candidates"
     reward: str = "error"
     order: str = "nearest"
-    candidates: int = CANDIDATES
+    candidates: int = 12
 
 
 class Interface:
@@ -29,6 +27,3 @@ class Interface:
         self.action = make_action(settings.action, scenario, settings.order, settings.candidates)
         self.observation = make_observation(settings.observation, scenario, settings.candidates)
         self.reward = make_reward(settings.reward)
-
-
-__all__ = ["CANDIDATES", "REWARDS", "Interface", "Settings"]

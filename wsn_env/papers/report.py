@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from wsn_env.evaluation import replacing
+from wsn_env.files import replacing
 
 HOLDS = "holds"
 UNDER_READING = "holds under a stated reading"
@@ -84,7 +84,7 @@ def prepare(out: Path) -> None:
 
 def write_sheet(path: Path, sheet: Sheet) -> None:
     """A table as CSV; numbers with six digits, None and NaN as an empty cell."""
-    with replacing(path) as file:
+    with replacing(path) as temporary, open(temporary, "w", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(sheet.columns)
         table.writerows([_cell(value) for value in row] for row in sheet.rows)
@@ -104,8 +104,8 @@ def write_expected(path: Path, expected: Iterable[Expectation]) -> None:
 
 def write_picture(path: Path, figure) -> None:
     """A matplotlib figure as PNG."""
-    with replacing(path, "wb") as file:
-        figure.savefig(file, format="png", dpi=150)
+    with replacing(path) as temporary:
+        figure.savefig(temporary, format="png", dpi=150)
 
 
 def _cell(value) -> str:

@@ -15,6 +15,7 @@ from wsn_env.numerics import HALF_PI, sincos
 from wsn_env.scenario import MOTIONS, Recorded, Scenario, ScenarioError
 
 CROSSING, STRAIGHT, SINE, CIRCLE, TURNS, WAYPOINT, RECORDED = range(len(MOTIONS))
+CROSSING_TRIES = 100
 CODES = dict(zip(MOTIONS.values(), range(len(MOTIONS))))
 
 
@@ -114,9 +115,15 @@ def _cross(stream, margin_m, crossing_m, acceleration_ms2, period_s, side_m, tra
         draw += 4
     duration = steps * period_s
     track[0] = np.array((x0, (x1 - x0) / duration, y0, (y1 - y0) / duration))
-    for k in range(steps):
-        ax, ay = draws.normal_pair(stream, 1_000_000 + k)
-        advance(track[k], period_s, acceleration_ms2 * ax, acceleration_ms2 * ay, track[k + 1])
+    for attempt in range(CROSSING_TRIES + 1):  # the first noise that keeps the target in the field; at last none
+        sd = acceleration_ms2 if attempt < CROSSING_TRIES else 0.0
+        inside = True
+        for k in range(steps):
+            ax, ay = draws.normal_pair(stream, 1_000_000 + attempt * steps + k)
+            advance(track[k], period_s, sd * ax, sd * ay, track[k + 1])
+            inside &= 0.0 <= track[k + 1, 0] <= side_m and 0.0 <= track[k + 1, 2] <= side_m
+        if inside:
+            return
 
 
 @piece

@@ -43,7 +43,7 @@ def report(key, period, node, head, purpose, positions, battery, spent, energy, 
     """A member's report with its retries. Returns whether the head has it; the head's own is free."""
     if node == head:
         return True
-    stream = draws.stream(key, period, draws.PACKET)
+    stream = draws.stream(key, period, draws.SEARCH_PACKET if purpose == SEARCH else draws.PACKET)
     for attempt in range(c.tries):
         if not send(node, head, c.report_bits, purpose, positions, battery, spent, energy, c):
             return False
