@@ -26,12 +26,13 @@ from stable_baselines3.common.vec_env import VecMonitor
 from agents.ppo import PPOPolicy, network_of, save_policy
 from agents.sb3 import SB3VecEnv
 from wsn_env.cli import make_scenario
-from wsn_env.evaluation import evaluate, forget_blocks, versions
+from wsn_env.evaluation import FIRST_SEED, evaluate, evaluation_seeds, forget_blocks, versions
 from wsn_env.files import replacing
 from wsn_env.interface import Settings
 from wsn_env.policies import make_policy, policy_names
 from wsn_env.progress import progress_bar
 from wsn_env.reports import draw_front, print_tables
+from wsn_env.scenario import check_quantity
 from wsn_env.vector_env import ClusterVectorEnv
 
 
@@ -59,7 +60,8 @@ class Training:
     runs: Path = Path("runs")
     """Folder of all runs."""
     resume: bool = False
-    """Continue the run of this name from its last checkpoint (or begin it)."""
+    """Continue the run of this name from its last checkpoint (or begin it). The episodes after it are others than in a
+    training that was never stopped."""
 
     # PPO
     steps: int = 3_000_000
@@ -106,7 +108,7 @@ def main() -> int:
     settings = tyro.cli(Training, description=__doc__)
     try:
         train(settings)
-    except ValueError as problem:
+    except (ValueError, OSError, MemoryError) as problem:
         print(f"train.py: {problem}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
@@ -117,14 +119,12 @@ def main() -> int:
 
 def train(settings: Training) -> None:
     """The whole story."""
-    if not 0 <= settings.seed < 2**31 - settings.steps - settings.rows:
-        raise ValueError(f"--seed {settings.seed}: must be at least 0 and below 2^31 - steps - rows")
+    check(settings)
     torch.set_num_threads(settings.torch_threads)
     scenario = make_scenario(settings.scenario, settings.set, settings.tracks, lam=settings.lam)
     speaks = Settings(reward=settings.reward, order=settings.order)
-    folder = open_folder(settings)
-
     envs = ClusterVectorEnv(settings.rows, scenario, autoreset_mode="Disabled", **asdict(speaks))
+    folder = open_folder(settings)
     adapted = SB3VecEnv(envs, lam_scale=0.3, stagger=True)
     model = make_model(settings, VecMonitor(adapted), folder)
     left = settings.steps - model.num_timesteps
@@ -150,11 +150,27 @@ def train(settings: Training) -> None:
         compare(settings, scenario, policy)
 
 
+def check(settings: Training) -> None:
+    """Refuse now what would fail after the training."""
+    for name in "steps rows rollout batch epochs torch_threads checkpoint_steps".split():
+        check_quantity("train.py", name, getattr(settings, name), at_least=1, whole=True)
+    for name in ("gamma", "gae_lambda"):
+        check_quantity("train.py", name, getattr(settings, name), at_least=0, at_most=1)
+    for units in settings.network:
+        check_quantity("train.py", "network", units, at_least=1, whole=True)
+    # Every seed that training may use lies below those of evaluations.
+    most = FIRST_SEED - settings.steps - settings.rows
+    check_quantity("train.py", "seed", settings.seed, at_least=0, at_most=most, whole=True)
+    if settings.episodes:
+        evaluation_seeds(settings.evaluation_seed, settings.episodes)
+
+
 def open_folder(settings: Training) -> Path:
     """The run's folder with config.json; an existing run is only touched by --resume, with the same settings."""
     folder = settings.folder
     path = folder / "config.json"
-    if path.exists():
+    begun = (folder / "checkpoint.zip").exists() or (folder / "policy.json").exists()
+    if path.exists() and begun:
         if not settings.resume:
             raise ValueError(f"{folder} exists: --resume continues it, --name begins another, or remove it")
         old, new = json.loads(path.read_text()), plain(settings)

@@ -48,6 +48,8 @@ class Network:
             raise ValueError(f"network has {len(layers)} layers: must have two hidden ones and the output")
         self.layers = [(np.ascontiguousarray(w, F), np.ascontiguousarray(b, F)) for w, b in layers]
         for (w, b), (after, _) in zip(self.layers, self.layers[1:] + [(np.empty((len(self.layers[-1][1]), 0)), None)]):
+            if not (np.isfinite(w).all() and np.isfinite(b).all()):
+                raise ValueError("network has weights that are not finite")
             if w.ndim != 2 or w.shape[1] != len(b) or len(after) != len(b):
                 raise ValueError(f"network layer of shape {w.shape} does not fit its neighbours")
 
@@ -69,12 +71,12 @@ class Network:
 
     def save(self, path: str | Path) -> None:
         """Write a safetensors file."""
-        from safetensors.numpy import save_file
+        from safetensors.numpy import save
 
         tensors = {}
         for i, (w, b) in enumerate(self.layers):
             tensors[f"{i}.weight"], tensors[f"{i}.bias"] = w, b
-        save_file(tensors, str(path))
+        Path(path).write_bytes(save(tensors))
 
     @classmethod
     def load(cls, path: str | Path) -> Network:

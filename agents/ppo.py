@@ -20,7 +20,7 @@ from wsn_env.view import View
 class PPOPolicy(ViewPolicy):
     """Takes the most probable action of the network that `train.py` saved at `path` (a policy.json)."""
 
-    path: str = "policy.json"
+    path: str = ""
 
     def __repr__(self):
         """Tells it from others by what it has learned."""
@@ -29,10 +29,15 @@ class PPOPolicy(ViewPolicy):
 
     @cached_property
     def _parts(self) -> tuple[Interface, Network]:
+        if not self.path:
+            raise ValueError("policy 'ppo' is learned: name the policy.json that train.py saved instead")
         path = Path(self.path)
         try:
             saved = json.loads(path.read_text())
-            interface = Interface(self.scenario, Settings(**saved["interface"]))
+            settings = Settings(**saved["interface"])
+            if (settings.action, settings.observation) != ("menu", "candidates"):
+                raise ValueError(f"{path}: speaks {settings}: must be action menu, observation candidates")
+            interface = Interface(self.scenario, settings)
         except (OSError, KeyError, TypeError, UnicodeDecodeError) as problem:
             raise ValueError(f"{path} is not a saved policy: {problem!r}") from None
         network = Network.load(path.with_suffix(".safetensors"))

@@ -20,17 +20,19 @@ class PreDC(ViewPolicy):
     neighbours join in order of detection probability until the joint probability exceeds theta.
 
     Differs from the paper: as printed only E >= Phi0 ends a cluster, so that one that the target has left keeps
-    waiting; here the joint detection probability at the prediction must also stay at theta or above.
+    waiting; here the joint detection probability at the prediction must also stay at `keep_theta` or above.
     """
 
     theta: float = 0.9  # theta_d: joint detection probability wanted
+    keep_theta: float | None = None  # joint probability that keeps a cluster; None: theta; 0: as printed
     phi0_m: float = 2.0  # Phi0: prediction sd from which the cluster is formed anew [m]
 
     def act(self, view: View) -> Cluster:
         """Keep or form, for every row."""
         p = self.detection(view)
+        keep_theta = self.theta if self.keep_theta is None else self.keep_theta
         standing = joint_detection_probability(np.where(view.member, p, 0.0))
-        keep = (view.spread_m < self.phi0_m) & (standing >= self.theta) & (view.head >= 0)
+        keep = (view.spread_m < self.phi0_m) & (standing >= keep_theta) & (view.head >= 0)
         head, chosen = self._form(view, p)
         return Cluster.of(np.where(keep, view.head, head), np.where(keep[:, None], view.member, chosen))
 

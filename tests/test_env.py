@@ -251,6 +251,12 @@ def test_bad_actions_name_the_space(action, bad):
         envs.step(np.stack([bad, bad]))
 
 
+def test_the_view_can_be_flattened():
+    env = gym.wrappers.FlattenObservation(ClusterEnv(observation="view", **SMALL))
+    observation, _ = env.reset(seed=0)
+    assert env.observation_space.contains(observation) and len(observation) < 1000
+
+
 def test_actions_are_whole_numbers():
     envs = ClusterVectorEnv(2, **SMALL)
     envs.reset(seed=0)

@@ -147,3 +147,13 @@ def test_repeated_and_missing_lams():
         evaluate(["nearest0"], SCENARIO.override(lam=(1.0, 2.0)), episodes=3)
     with pytest.raises(ValueError, match="at least one"):
         evaluate([], SCENARIO, [1.0])
+
+
+def test_damaged_blocks_are_played_again(tmp_path):
+    whole = evaluate(["nearest0"], SCENARIO, [1.0], episodes=4)
+    evaluate(["nearest0"], SCENARIO, [1.0], episodes=4, keep=tmp_path)
+    blocks = tmp_path / "evaluation.blocks.jsonl"
+    head = blocks.read_text().splitlines()[0]
+    for damage in (b"\xff\xfe", b"5", b'["nearest0", 1.0, 0, []]', b'["nearest0", 1.0, 0, 7]'):
+        blocks.write_bytes(head.encode() + b"\n" + damage + b"\n")
+        assert evaluate(["nearest0"], SCENARIO, [1.0], episodes=4, keep=tmp_path).rows == whole.rows

@@ -114,6 +114,35 @@ def test_damaged_files_say_so(run, tmp_path):
         PPOPolicy(scenario, path=str(tmp_path / "none.json")).act(view)
 
 
+@pytest.mark.parametrize(
+    "bad", [dict(rollout=0), dict(steps=0), dict(gamma=2.0), dict(seed=2**31), dict(episodes=-1), dict(network=(0, 8))]
+)
+def test_bad_settings_are_refused_before_anything_is_done(bad, tmp_path):
+    with pytest.raises(ValueError, match=next(iter(bad))):
+        train.train(train.Training(name="bad", runs=tmp_path, **(SHORT | bad)))
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_mistyped_run_leaves_no_trap(tmp_path):
+    with pytest.raises(ValueError, match="rewad"):
+        train.train(train.Training(name="short", runs=tmp_path, reward="rewad", **SHORT))
+    train.train(train.Training(name="short", runs=tmp_path, **(SHORT | dict(steps=1024, episodes=0))))
+
+
+def test_saved_policies_are_checked(run, tmp_path):
+    scenario = Scenario.named("PreDC-v0", **parse_overrides(SET))
+    network = Network.load(run / "policy.safetensors")
+    broken = [(w * np.nan, b) for w, b in network.layers]
+    with pytest.raises(ValueError, match="finite"):
+        Network(broken)
+    for kind in ("pre_dc", 5, "nothing"):
+        (tmp_path / "policy.json").write_text(json.dumps({"kind": kind}))
+        with pytest.raises(ValueError, match="not a saved policy"):
+            make_policy(str(tmp_path), scenario)
+    with pytest.raises(ValueError, match="name the policy.json"):
+        make_policy("ppo", scenario).act(None)
+
+
 def test_help_explains_every_setting():
     answer = subprocess.run([sys.executable, train.__file__, "--help"], capture_output=True, text=True, check=True)
     for name in train.Training.__dataclass_fields__:

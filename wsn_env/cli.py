@@ -53,7 +53,7 @@ def main(arguments: list[str] | None = None) -> int:
     command = tyro.extras.subcommand_cli_from_dict(commands, prog="wsn", args=arguments)
     try:
         run_evaluate(command) if isinstance(command, Evaluate) else run_reproduce(command)
-    except ValueError as problem:
+    except (ValueError, OSError, MemoryError) as problem:
         print(f"wsn: {problem}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:

@@ -35,7 +35,10 @@ def lean_kernel(function):
 
 
 def _cached(dispatcher):
-    dispatcher._cache = _PackageCache(dispatcher.py_func)
+    try:
+        dispatcher._cache = _PackageCache(dispatcher.py_func)
+    except RuntimeError:  # no folder that could be written to: compiled anew in every process
+        pass
     return dispatcher
 
 
@@ -50,7 +53,7 @@ class _PackageCache(FunctionCache):
         self._cache_file = IndexDataCacheFile(
             cache_path=self._cache_path,
             filename_base=self._impl.filename_base,
-            source_stamp=(self._impl.locator.get_source_stamp(), _stamp()),
+            source_stamp=(self._impl.locator.get_source_stamp(), kernels_stamp()),
         )
 
     def load_overload(self, sig, target_context):
@@ -61,7 +64,8 @@ class _PackageCache(FunctionCache):
 
 
 @functools.cache
-def _stamp() -> str:
+def kernels_stamp() -> str:
+    """Digest of every file of the package that has kernels."""
     texts = (path.read_bytes() for path in sorted(PACKAGE.rglob("*.py")))
     return hashlib.sha256(b"".join(text for text in texts if b"compiling" in text)).hexdigest()
 

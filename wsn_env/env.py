@@ -119,6 +119,8 @@ class ClusterEnv(gym.Env):
 
     def action_masks(self) -> np.ndarray:
         """Which entries of the action make sense now (flat bool, as sb3-contrib's MaskablePPO wants them)."""
+        if self._view is None:
+            raise gym.error.ResetNeeded("call reset() before action_masks()")
         return self.interface.action.masks(self._view)[0]
 
     def render(self):

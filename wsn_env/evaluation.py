@@ -11,6 +11,7 @@ import csv
 import hashlib
 import json
 import platform
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -19,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from wsn_env import draws
+from wsn_env.compiling import kernels_stamp
 from wsn_env.files import replacing
 from wsn_env.policies import Policy, make_policy
 from wsn_env.progress import Progress
@@ -191,14 +193,14 @@ def evaluate(
     named = policies if isinstance(policies, dict) else {name: make_policy(name, scenario) for name in policies}
     seeds = evaluation_seeds(seed, episodes)
     blocks = [seeds[i : i + BLOCK] for i in range(0, episodes, BLOCK)]
-    kept = _Kept(keep, _settings(scenario, named, lams, episodes, seed) | {"choosers": list(map(repr, named.values()))})
+    kept = _Kept(keep, _settings(scenario, named, lams, episodes, seed), list(named.values()))
     rows: list[dict] = []
     done, total = 0, len(lams) * len(named) * len(blocks)
     for lam in lams:
         world = World(scenario.override(lam=lam), threads)
         for name, policy in named.items():
             for number, block in enumerate(blocks):
-                measured = kept.get(name, lam, number)
+                measured = kept.get(name, lam, number, len(block))
                 if measured is None:
                     measured = kept.put(name, lam, number, rollout(policy, world, block))
                 for i, values in enumerate(measured):
@@ -220,30 +222,31 @@ def evaluate(
 class _Kept:
     """Finished blocks in a JSON-lines file; one of other settings or policies is not read but begun anew.
 
-    A policy is known by its repr, which for a dataclass shows its parameters.
+    A policy is known by its repr, which for a dataclass shows its parameters, and by the file of its class.
     """
 
-    def __init__(self, folder: str | Path | None, settings: dict):
+    def __init__(self, folder: str | Path | None, settings: dict, policies: Sequence[Policy]):
         self._blocks: dict[tuple, list[dict]] = {}
         self._path = None if folder is None else Path(folder) / "evaluation.blocks.jsonl"
         if self._path is None:
             return
-        head = hashlib.sha256(json.dumps(settings | {"versions": versions()}, sort_keys=True).encode()).hexdigest()
-        lines = self._path.read_text().splitlines() if self._path.exists() else []
+        head = _digest(settings, policies)
+        lines = self._path.read_text(errors="replace").splitlines() if self._path.exists() else []
         if lines and lines[0] == json.dumps(head):
             for line in lines[1:]:
                 try:
                     name, lam, number, measured = json.loads(line)
-                except ValueError:
+                    self._blocks[name, lam, number] = [dict(values) for values in measured]
+                except (ValueError, TypeError):
                     continue  # cut short when the run was killed
-                self._blocks[name, lam, number] = measured
         self._path.parent.mkdir(parents=True, exist_ok=True)
         kept = [[*key, measured] for key, measured in self._blocks.items()]
         with replacing(self._path) as path:
             path.write_text("".join(json.dumps(line) + "\n" for line in [head, *kept]))
 
-    def get(self, name: str, lam: float, number: int) -> list[dict] | None:
-        return self._blocks.get((name, lam, number))
+    def get(self, name: str, lam: float, number: int, size: int) -> list[dict] | None:
+        measured = self._blocks.get((name, lam, number))
+        return measured if measured is not None and len(measured) == size else None
 
     def put(self, name: str, lam: float, number: int, measured: list[dict]) -> list[dict]:
         if self._path is not None:
@@ -259,6 +262,15 @@ class _Kept:
 def forget_blocks(folder: str | Path) -> None:
     """Remove the kept blocks of a finished run."""
     _Kept.forget(folder)
+
+
+def _digest(settings: dict, policies: Sequence[Policy]) -> str:
+    """Of all that decides the rows: settings, policies, recorded tracks, versions and the package's own kernels."""
+    sources = [getattr(sys.modules.get(type(policy).__module__), "__file__", None) for policy in policies]
+    files = [*settings["scenario"]["motion"].get("tracks", ()), *filter(None, sources)]
+    contents = [hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in files]
+    known = [settings, versions(), kernels_stamp(), list(map(repr, policies)), contents]
+    return hashlib.sha256(json.dumps(known, sort_keys=True).encode()).hexdigest()
 
 
 def versions() -> dict[str, str]:

@@ -59,4 +59,9 @@ def load_learned(path: Path, scenario: Scenario) -> Policy:
         raise ValueError(f"policy {str(path)!r} does not exist") from None
     except (ValueError, KeyError, TypeError, UnicodeDecodeError) as problem:
         raise ValueError(f"{path} is not a saved policy: {problem!r}") from None
-    return make_policy(kind, scenario, path=str(path))
+    if kind not in policy_names():
+        raise ValueError(f"{path} is not a saved policy: its kind is {kind!r}, known are {', '.join(policy_names())}")
+    try:
+        return make_policy(kind, scenario, path=str(path))
+    except TypeError:
+        raise ValueError(f"{path} is not a saved policy: its kind {kind!r} is not learned") from None

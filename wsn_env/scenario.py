@@ -21,37 +21,42 @@ class ScenarioError(ValueError):
     """A quantity is not what it may be; the message names it, its value and what is allowed."""
 
 
-def quantity(default, meaning, *, above=None, at_least=None, at_most=None, whole=False, choices=None, optional=False):
-    """A field with its meaning (shown by --help) and what is allowed."""
-    allowed = dict(above=above, at_least=at_least, at_most=at_most, whole=whole, choices=choices, optional=optional)
+def quantity(default, meaning, **allowed):
+    """A field with its meaning and what is allowed, in the words of `check_quantity`."""
     return field(default=default, metadata={"meaning": meaning, "allowed": allowed})
 
 
-def check_quantity(owner: str, name: str, value: Any, allowed: dict) -> None:
-    """Raise ScenarioError unless `value` is allowed for the field `name` of `owner`."""
-    if value is None and allowed["optional"]:
+def check_quantity(
+    owner: str, name: str, value, *, above=None, at_least=None, at_most=None, whole=False, choices=None, optional=False
+) -> None:
+    """Raise ScenarioError unless `value` is allowed for the field `name` of `owner`.
+
+    Args:
+        above, at_least, at_most: bounds.
+        whole: whole numbers only.
+        choices: these values only.
+        optional: None too.
+    """
+    if value is None and optional:
         return
-    if allowed["choices"] is not None:
-        if value not in allowed["choices"]:
-            raise ScenarioError(f"{owner}.{name} = {value!r}: allowed are {', '.join(map(str, allowed['choices']))}")
+    if choices is not None:
+        if value not in choices:
+            raise ScenarioError(f"{owner}.{name} = {value!r}: allowed are {', '.join(map(str, choices))}")
         return
-    kind = "a whole number" if allowed["whole"] else "a finite number"
-    rules = [
-        f"{words} {allowed[rule]}"
-        for rule, words in (("above", "above"), ("at_least", "at least"), ("at_most", "at most"))
-        if allowed[rule] is not None
-    ]
-    numeric = isinstance(value, NUMBERS) and not isinstance(value, bool)
     good = (
-        numeric
+        isinstance(value, NUMBERS)
+        and not isinstance(value, bool)
         and abs(value) < math.inf
-        and (not allowed["whole"] or value == int(value))
-        and (allowed["above"] is None or value > allowed["above"])
-        and (allowed["at_least"] is None or value >= allowed["at_least"])
-        and (allowed["at_most"] is None or value <= allowed["at_most"])
+        and (not whole or value == int(value))
+        and (above is None or value > above)
+        and (at_least is None or value >= at_least)
+        and (at_most is None or value <= at_most)
     )
     if not good:
-        raise ScenarioError(f"{owner}.{name} = {value!r}: must be {' '.join([kind, ' and '.join(rules)]).strip()}")
+        bounds = (("above", above), ("at least", at_least), ("at most", at_most))
+        rules = " and ".join(f"{words} {bound}" for words, bound in bounds if bound is not None)
+        kind = "a whole number" if whole else "a finite number"
+        raise ScenarioError(f"{owner}.{name} = {value!r}: must be {kind} {rules}".rstrip())
 
 
 @dataclass(frozen=True)
@@ -62,8 +67,8 @@ class Section:
         for item in fields(self):
             if "allowed" in item.metadata:
                 value, allowed = getattr(self, item.name), item.metadata["allowed"]
-                check_quantity(type(self).__name__, item.name, value, allowed)
-                if allowed["whole"] and value is not None:
+                check_quantity(type(self).__name__, item.name, value, **allowed)
+                if allowed.get("whole") and value is not None:
                     object.__setattr__(self, item.name, int(value))
 
 
@@ -375,7 +380,7 @@ class Scenario(Section):
         return self.radio.handover_bits if self.radio.handover == "estimate" else 5 * 32 * self.tracking.particles
 
     @classmethod
-    def named(cls, name: str, **overrides) -> Scenario:
+    def named(cls, name: str, /, **overrides) -> Scenario:
         """A preset, with overrides by quantity.
 
         Args:

@@ -48,9 +48,9 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         **overrides,
     ):
         check_render_mode(render_mode, self.metadata)
-        if not isinstance(num_envs, int) or num_envs < 1:
+        if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
             raise ValueError(f"num_envs = {num_envs!r}: must be a whole number, at least 1")
-        self.num_envs = num_envs
+        self.num_envs = int(num_envs)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = type(self).metadata | {"autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
@@ -159,6 +159,8 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
 
     def action_masks(self) -> np.ndarray:
         """(B, n) bool: which entries of each row's action make sense now."""
+        if self._view is None:
+            raise gym.error.ResetNeeded("call reset() before action_masks()")
         return self.interface.action.masks(self._view)
 
     def render(self):

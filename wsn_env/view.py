@@ -124,7 +124,7 @@ class View:
         return {
             "period": self.period.astype(np.int64),
             "lam": self.lam[:, None].copy(),
-            "luck": self.luck.astype(np.int64),
+            "luck": self.luck[:, None].astype(np.int64),
             "log_miss": self.log_miss[:, None].copy(),
             "mean": self.mean.copy(),
             "cov": self.cov.copy(),

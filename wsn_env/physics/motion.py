@@ -224,7 +224,7 @@ def read_track(path: str, scenario: Scenario) -> np.ndarray:
     times, points = [], []
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
-            table = csv.DictReader(file)
+            table = csv.DictReader(file, skipinitialspace=True)
             missing = [name for name in "txy" if name not in (table.fieldnames or ())]
             if missing:
                 raise ScenarioError(
@@ -260,6 +260,8 @@ def _resampled(path, times, points, scenario: Scenario) -> np.ndarray:
         raise ScenarioError(
             f"{path}: spans {points.min()}..{points.max()} m: must lie in the field 0..{side} m, or give span_m"
         )
+    if not np.isfinite(points).all():
+        raise ScenarioError(f"{path}: coordinates as large as this cannot be scaled to span_m = {span}")
     at = np.linspace(times[0], times[-1], scenario.periods + 1)
     track = np.empty((scenario.periods + 1, 4))
     for axis in (0, 1):
