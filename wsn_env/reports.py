@@ -38,15 +38,20 @@ def _interval(value, digits: int, sign: str = "") -> str:
     return f"{value.mean:{sign}.{digits}f} [{value.low:{sign}.{digits}f}, {value.high:{sign}.{digits}f}]"
 
 
+def wide_console():
+    """For the terminal, or as wide as a table wants where the output is a file or a pipe."""
+    from rich.console import Console
+
+    console = Console()
+    return console if console.is_terminal else Console(width=140)
+
+
 def print_tables(evaluation: Evaluation, reference: str | None = None, console=None) -> None:
     """One table for each lam."""
-    from rich.console import Console
     from rich.table import Table
 
     reference = reference or evaluation.policies[0]
-    console = console or Console()
-    if not console.is_terminal:  # a file or a pipe has room
-        console = Console(width=140)
+    console = console or wide_console()
     for lam in evaluation.lams:
         title = f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes"
         table = Table(

@@ -12,11 +12,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from wsn_env.files import replacing
+from wsn_env.reports import wide_console
 
 HOLDS = "holds"
 UNDER_READING = "holds under a stated reading"
@@ -121,7 +121,7 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
         table.add_column(escape(column), justify="right" if i else "left")
     for row in rows:
         table.add_row(*map(escape, row))
-    Console().print(table)
+    wide_console().print(table)
 
 
 def print_claims(claims: Iterable[Claim]) -> None:
@@ -131,13 +131,13 @@ def print_claims(claims: Iterable[Claim]) -> None:
         table.add_column(column)
     for c in claims:
         table.add_row(escape(c.claim), escape(c.paper), escape(c.ours), f"[{COLOURS[c.verdict]}]{c.verdict}[/]")
-    Console().print(table)
+    wide_console().print(table)
 
 
 def print_expected(expected: Sequence[Expectation]) -> None:
     """How many expected figures were met, and each that was not."""
     missed = [e for e in expected if not e.within]
-    Console().print(f"Expected figures: {len(expected) - len(missed)} of {len(expected)} within their tolerance.")
+    wide_console().print(f"Expected figures: {len(expected) - len(missed)} of {len(expected)} within their tolerance.")
     for e in missed:
         text = f"  missed: {e.quantity}: {e.measured:.4g}, expected {e.expected:.4g} +- {e.tolerance:.2g}"
-        Console().print(escape(text))
+        wide_console().print(escape(text))

@@ -14,7 +14,7 @@ import numpy as np
 from wsn_env.papers.pre_dc.systems import MOTIONS, NODES, PARTICLES, Results
 from wsn_env.papers.report import Claim, Expectation, verdict
 from wsn_env.papers.rollout import Record, standard_error
-from wsn_env.physics.sensing import detection_probability
+from wsn_env.physics.sensing import detection_probability, joint_detection_probability
 from wsn_env.scenario import Detection
 
 SIGNIFICANT = 2.0  # standard errors
@@ -45,6 +45,17 @@ def expected(results: Results) -> list[Expectation]:
         Expectation(f"p({d:g} m)", p, tolerance, float(detection_probability(d, Detection())))
         for d, p, tolerance in PROBABILITIES
     ]
+    three, two = joint_detection_probability([[0.6, 0.6, 0.6], [0.6, 0.6, 0.0]])
+    figures += [
+        Expectation("joint probability of three nodes with p = 0.6", 0.936, 1e-9, float(three)),
+        Expectation("joint probability of two nodes with p = 0.6", 0.84, 1e-9, float(two)),
+    ]
+    rms = float(results.as_printed().rms_m().mean())
+    figures.append(Expectation("RMS [m] of pre_dc at 225 nodes with Phi0 alone", 1.35, EXPECTED_SHARE * 1.35, rms))
+    cluster, pre_dc = (results.same_tracker(name).energy_mj.mean() for name in ("static_cluster", "pre_dc"))
+    figures.append(
+        Expectation("energy of static_cluster over pre_dc's, same tracker", 4.0, 1.0, float(cluster / pre_dc))
+    )
     for label, cells, share in (("our reading", EXPECTED_RMS_M, EXPECTED_SHARE), ("paper", PAPER_RMS_M, PAPER_SHARE)):
         for (name, nodes), rms in cells.items():
             measured = float(results.system_rms_m(name, nodes).mean())

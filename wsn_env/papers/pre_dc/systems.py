@@ -53,6 +53,11 @@ def scenario_as_read(**changes) -> Scenario:
     return Scenario.named("PreDC-v0", **(READING | changes))
 
 
+def as_printed_trial(runs: int) -> Trial:
+    """Pre-DC with Phi0 alone, which keeps clusters that the target has left."""
+    return Trial("pre_dc", scenario_as_read(), runs, (("keep_theta", 0.0),))
+
+
 def same_tracker_trial(policy: str, nodes: int, runs: int) -> Trial:
     """A policy with the particle filter that all policies share."""
     return Trial(policy, scenario_as_read(nodes=nodes), runs, SAME_TRACKER[policy])
@@ -93,6 +98,10 @@ class Results:
         """A policy with the common tracker."""
         return self.records[same_tracker_trial(policy, nodes, self.runs)]
 
+    def as_printed(self) -> Record:
+        """Pre-DC with Phi0 alone."""
+        return self.records[as_printed_trial(self.runs)]
+
     def particles(self, count: int) -> Record:
         """Pre-DC with so many particles."""
         return self.records[particle_trial(count, self.runs)]
@@ -107,5 +116,6 @@ def play_paper(runs: int, progress: Progress) -> Results:
     trials = [system.trial(nodes, runs) for nodes in NODES for system in SYSTEMS.values()]
     trials += [same_tracker_trial(policy, nodes, runs) for nodes in NODES for policy in SAME_TRACKER]
     trials += [motion_trial(motion, runs, fitting) for motion in MOTIONS for fitting in (True, False)]
+    trials += [as_printed_trial(runs)]
     trials += [particle_trial(count, runs) for count in PARTICLES]
     return Results(runs, play_all(trials, progress))
