@@ -1,7 +1,7 @@
 """A vector environment of 64 rows at P = 5000 reaches at least 0.4 times the steps/s of its bare filter kernel (20,000
 where that makes 50,000), and at least 60 times those of a naive environment (Python loops over members) whose particle
-filter is built as filterpy's book does; 20 times with a filter of plain NumPy expressions, the best that one would
-write by hand.
+filter is built as filterpy's book does. With a filter of plain NumPy expressions, the best that one would write by
+hand, the naive environment is raced too, without a claim.
 
     python -m benchmarks.environment [--json FILE]
 
@@ -36,7 +36,7 @@ ID = "wsn_env/PreDC-v0"
 ROWS = 64
 FURTHER = 3  # members beside the head
 MENU_ENTRY = 10 + FURTHER  # move the head to the nearest node
-AT_LEAST = {"kernel": 0.4, "naive": 20.0, "book": 60.0}  # steps/s of the vector environment over a contestant's
+AT_LEAST = {"kernel": 0.4, "book": 60.0}  # steps/s of the vector environment over a contestant's
 ROUND_S = 0.15  # what a contestant gets in a round
 
 

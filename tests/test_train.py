@@ -55,7 +55,7 @@ def test_the_saved_policy_is_the_trained_one_without_torch(run):
     assert (ours == np.concatenate([network.logits(observation[i : i + 1]) for i in range(16)])).all()
     code = (
         "import sys\nfrom wsn_env.cli import main\n"
-        f"main(['evaluate', '--policies', 'nearest1', {str(run)!r}, '--episodes', '3', '--set', *{SET!r}])\n"
+        f"main(['evaluate', '--policies', 'nearest1', 'ppo={run}', '--episodes', '3', '--set', *{SET!r}])\n"
         "assert 'torch' not in sys.modules and 'stable_baselines3' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)

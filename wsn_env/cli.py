@@ -20,7 +20,8 @@ class Evaluate:
     scenario: str = "PreDC-v0"
     """Scenario id."""
     policies: list[str] = field(default_factory=lambda: ["pre_dc", "centroid", "static_cluster"])
-    """Policies by name, or paths of a saved policy.json; the first is the reference of the differences."""
+    """Policies by name, or paths of a saved policy.json, also as label=path; the first is the reference of the
+    differences."""
     lam: list[float] | None = None
     """Trade-offs between error and energy [m/mJ]; left out: the scenario's."""
     episodes: int = 100

@@ -173,7 +173,8 @@ def evaluate(
     """Paired comparison of policies.
 
     Args:
-        policies: names (or paths of saved policies), or name -> Policy. The first is the reference of differences.
+        policies: names, paths of saved policies, or "label=path"; or name -> Policy. The first is the reference of
+            differences.
         scenario: what they act in.
         lams: the trade-offs [m/mJ]; None: the scenario's, which must then be a single one.
         episodes: common random episodes for each policy and lam.
@@ -190,7 +191,7 @@ def evaluate(
     lams = tuple(dict.fromkeys(map(float, [scenario.lam] if lams is None else lams)))
     if not policies or not lams:
         raise ValueError("policies and lams must name at least one each")
-    named = policies if isinstance(policies, dict) else {name: make_policy(name, scenario) for name in policies}
+    named = policies if isinstance(policies, dict) else dict(_made(text, scenario) for text in policies)
     seeds = evaluation_seeds(seed, episodes)
     blocks = [seeds[i : i + BLOCK] for i in range(0, episodes, BLOCK)]
     kept = _Kept(keep, _settings(scenario, named, lams, episodes, seed), list(named.values()))
@@ -217,6 +218,12 @@ def evaluate(
                 if progress:
                     progress(done, total, f"{name}, lam {lam:g}")
     return Evaluation(scenario, tuple(named), lams, episodes, seed, rows)
+
+
+def _made(text: str, scenario: Scenario) -> tuple[str, Policy]:
+    """("ppo", policy) from "ppo=runs/mine/policy.json"; a name or a path alone is its own label."""
+    label, equals, source = text.partition("=")
+    return (label, make_policy(source, scenario)) if equals else (text, make_policy(text, scenario))
 
 
 class _Kept:
