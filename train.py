@@ -31,8 +31,8 @@ from wsn_env.files import replacing
 from wsn_env.interface import Settings
 from wsn_env.policies import make_policy, policy_names
 from wsn_env.progress import progress_bar
+from wsn_env.quantity import check_quantity
 from wsn_env.reports import draw_front, print_tables
-from wsn_env.scenario import check_quantity
 from wsn_env.vector_env import ClusterVectorEnv
 
 

@@ -11,7 +11,8 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Protocol
 
-from wsn_env.scenario import Scenario, suggest
+from wsn_env.quantity import suggest
+from wsn_env.scenario import Scenario
 from wsn_env.types import Cluster
 from wsn_env.view import View
 

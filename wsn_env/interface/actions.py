@@ -8,7 +8,8 @@ from gymnasium import spaces
 from wsn_env.compiling import lean_kernel
 from wsn_env.interface.merit import ORDERS, order_by_information
 from wsn_env.physics.constants import constants
-from wsn_env.scenario import Scenario, suggest
+from wsn_env.quantity import suggest
+from wsn_env.scenario import Scenario
 from wsn_env.types import Cluster
 from wsn_env.view import View
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 from gymnasium import spaces
 
-from wsn_env.compiling import lean_kernel
+from wsn_env.compiling import lean_kernel, lean_piece
 from wsn_env.interface.merit import gain, mean_detection
 from wsn_env.numerics import log
 from wsn_env.physics.constants import constants
 from wsn_env.physics.field import squared_distance
 from wsn_env.physics.sensing import detection_piece
-from wsn_env.scenario import Scenario, suggest
+from wsn_env.quantity import suggest
+from wsn_env.scenario import Scenario
 from wsn_env.view import View
 
 BELIEF_FEATURES = (
@@ -51,76 +52,88 @@ BOUND = 10.0
 
 @lean_kernel
 def _encode(start, stop, cs, battery_j, view, nodes, distances, out):
+    """Fill out (B, n): BELIEF_FEATURES, then CANDIDATE_FEATURES of each candidate."""
     c = cs[0]
     size, width = len(BELIEF_FEATURES), len(CANDIDATE_FEATURES)
-    r = c.radius_m
+    lam, log_miss, mean, cov, network, reports = view
     for b in range(start, stop):
-        (lam, log_miss, mean, cov, network, reports) = view
-        positions = network.positions[b]
-        m, p = mean[b], cov[b]
-        head = network.head[b]
-
-        # The position ellipse, and the frame of the velocity.
-        half, off = 0.5 * (p[0, 0] + p[2, 2]), 0.5 * (p[0, 0] - p[2, 2])
-        root = np.sqrt(off * off + p[0, 2] * p[0, 2])
-        major, minor = max(half + root, 1e-6), max(half - root, 1e-6)
-        speed = np.sqrt(m[1] * m[1] + m[3] * m[3])
-        ex, ey = (m[1] / speed, m[3] / speed) if speed > 1e-9 else (1.0, 0.0)
-        cos2, sin2 = (off / root, p[0, 2] / root) if root > 1e-12 else (1.0, 0.0)
-        c2, s2 = ex * ex - ey * ey, 2.0 * ex * ey
+        positions, m, p, head = network.positions[b], mean[b], cov[b], network.head[b]
+        members, n = network.members[b], network.n_members[b]
         f = out[b]
         f[:] = 0.0
         f[0] = 0.5 * log(max(lam[b], 1e-3))
-        f[1] = 0.5 * log(major)
-        f[2] = 0.5 * log(minor)
-        f[3] = np.sqrt(major) / r
-        f[4] = np.sqrt(minor) / r
-        f[5] = cos2 * c2 + sin2 * s2
-        f[6] = sin2 * c2 - cos2 * s2
-        f[7] = speed
-        f[8] = 0.5 * log(max(p[1, 1] + p[3, 3], 1e-6))
+        ex, ey = _encode_ellipse(m, p, c, f)
         f[9] = 0.2 * log_miss[b]
         f[10] = 0.25 * reports.count[b]
         if head >= 0:
-            dx, dy = (positions[head, 0] - m[0]) / r, (positions[head, 1] - m[2]) / r
-            f[11] = dx * ex + dy * ey
-            f[12] = dy * ex - dx * ey
-            f[13] = np.sqrt(dx * dx + dy * dy)
-            f[14] = mean_detection(positions, head, m, p, c)
-            f[15] = 1.0 if head == nodes[b, 0] else 0.0
-            f[16] = 0.25 * network.n_members[b]
-            missed = 1.0 - detection_piece(np.sqrt(squared_distance(positions, head, m[0], m[2])), c)
-            for k in range(network.n_members[b]):
-                node = network.members[b, k]
-                missed *= 1.0 - detection_piece(np.sqrt(squared_distance(positions, node, m[0], m[2])), c)
-            f[17] = 1.0 - missed
-        f[18] = distances[b, len(distances[b]) - 1] / r
-
-        j = 0
+            _encode_head(head, head == nodes[b, 0], members, n, positions, m, p, ex, ey, c, f)
+        f[18] = distances[b, len(distances[b]) - 1] / c.radius_m
         for k in range(nodes.shape[1]):
-            node = nodes[b, k]
-            g = f[size + k * width : size + (k + 1) * width]
+            node, g = nodes[b, k], f[size + k * width : size + (k + 1) * width]
             if node < 0:
                 g[2] = BOUND
                 continue
-            dx, dy = (positions[node, 0] - m[0]) / r, (positions[node, 1] - m[2]) / r
-            g[0] = dx * ex + dy * ey
-            g[1] = dy * ex - dx * ey
-            g[2] = distances[b, k] / r
-            g[3] = mean_detection(positions, node, m, p, c)
-            if head >= 0:
-                g[4] = np.sqrt(squared_distance(positions, node, positions[head, 0], positions[head, 1])) / r
-            for j in range(network.n_members[b]):
-                if network.members[b, j] == node:
-                    g[5] = 1.0
-            if node == head:
-                g[5] = 1.0
-                g[6] = 1.0
+            g[2] = distances[b, k] / c.radius_m
             g[7] = network.battery[b, node] / battery_j
-            drop = gain(positions, node, m, p, p[0, 0], p[0, 2], p[2, 2], c)[0]
-            g[8] = 0.25 * log(max(drop / (p[0, 0] + p[2, 2] + 1e-12), 1e-6))
+            _encode_candidate(node, head, members, n, positions, m, p, ex, ey, c, g)
         for i in range(len(f)):
             f[i] = min(max(f[i], np.float32(-BOUND)), np.float32(BOUND))
+
+
+@lean_piece
+def _encode_ellipse(m, p, c, f):
+    """f[1:9]: the position's ellipse and the velocity. Returns the direction of the velocity."""
+    half, off = 0.5 * (p[0, 0] + p[2, 2]), 0.5 * (p[0, 0] - p[2, 2])
+    root = np.sqrt(off * off + p[0, 2] * p[0, 2])
+    major, minor = max(half + root, 1e-6), max(half - root, 1e-6)
+    speed = np.sqrt(m[1] * m[1] + m[3] * m[3])
+    ex, ey = (m[1] / speed, m[3] / speed) if speed > 1e-9 else (1.0, 0.0)
+    cos2, sin2 = (off / root, p[0, 2] / root) if root > 1e-12 else (1.0, 0.0)
+    c2, s2 = ex * ex - ey * ey, 2.0 * ex * ey
+    f[1] = 0.5 * log(major)
+    f[2] = 0.5 * log(minor)
+    f[3] = np.sqrt(major) / c.radius_m
+    f[4] = np.sqrt(minor) / c.radius_m
+    f[5] = cos2 * c2 + sin2 * s2
+    f[6] = sin2 * c2 - cos2 * s2
+    f[7] = speed
+    f[8] = 0.5 * log(max(p[1, 1] + p[3, 3], 1e-6))
+    return ex, ey
+
+
+@lean_piece
+def _encode_head(head, is_nearest, members, n, positions, m, p, ex, ey, c, f):
+    """f[11:18]: the head, and what the standing cluster would detect at the prediction."""
+    dx, dy = (positions[head, 0] - m[0]) / c.radius_m, (positions[head, 1] - m[2]) / c.radius_m
+    f[11] = dx * ex + dy * ey
+    f[12] = dy * ex - dx * ey
+    f[13] = np.sqrt(dx * dx + dy * dy)
+    f[14] = mean_detection(positions, head, m, p, c)
+    f[15] = 1.0 if is_nearest else 0.0
+    f[16] = 0.25 * n
+    missed = 1.0 - detection_piece(np.sqrt(squared_distance(positions, head, m[0], m[2])), c)
+    for k in range(n):
+        missed *= 1.0 - detection_piece(np.sqrt(squared_distance(positions, members[k], m[0], m[2])), c)
+    f[17] = 1.0 - missed
+
+
+@lean_piece
+def _encode_candidate(node, head, members, n, positions, m, p, ex, ey, c, g):
+    """g[0:2], g[3:7], g[8]: a candidate's place, chances, role and gain."""
+    dx, dy = (positions[node, 0] - m[0]) / c.radius_m, (positions[node, 1] - m[2]) / c.radius_m
+    g[0] = dx * ex + dy * ey
+    g[1] = dy * ex - dx * ey
+    g[3] = mean_detection(positions, node, m, p, c)
+    if head >= 0:
+        g[4] = np.sqrt(squared_distance(positions, node, positions[head, 0], positions[head, 1])) / c.radius_m
+    for k in range(n):
+        if members[k] == node:
+            g[5] = 1.0
+    if node == head:
+        g[5] = 1.0
+        g[6] = 1.0
+    drop = gain(positions, node, m, p, p[0, 0], p[0, 2], p[2, 2], c)[0]
+    g[8] = 0.25 * log(max(drop / (p[0, 0] + p[2, 2] + 1e-12), 1e-6))
 
 
 class CandidatesObservation:

@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from wsn_env.scenario import suggest
+from wsn_env.quantity import suggest
 from wsn_env.types import Outcome
 
 DISBELIEF = 3.0  # a true error so many times the believed one is no accident

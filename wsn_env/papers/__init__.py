@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 
 from wsn_env.progress import Progress
-from wsn_env.scenario import suggest
+from wsn_env.quantity import suggest
 
 PAPERS = {"pre_dc": "wsn_env.papers.pre_dc"}
 
