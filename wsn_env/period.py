@@ -30,17 +30,13 @@ def sense_and_report(start, stop, cs, heads, chosen, state, outcome):
         reports.count[b] = 0
         head = network.head[b]
         if head >= 0:
-            # Nodes sense and report in the order of their numbers, the head among them.
-            n = network.n_members[b]
-            k = 0
-            head_done = False
-            while k < n or not head_done:
-                if not head_done and (k == n or head < network.members[b, k]):
-                    node = head
-                    head_done = True
-                else:
-                    node = network.members[b, k]
-                    k += 1
+            # In the order of their numbers, the head in its place among the members.
+            members, n = network.members[b], network.n_members[b]
+            place = 0
+            while place < n and members[place] < head:
+                place += 1
+            for k in range(n + 1):
+                node = head if k == place else members[k - (k > place)]
                 if _wake(node, radio.SENSING, network, outcome, b, c):
                     _detect_and_report(node, head, radio.REPORT, target, state, outcome, b, c)
         _remember_miss(state, b, c)
