@@ -57,8 +57,6 @@ class PreDC(ViewPolicy):
 
     def _head_energy_j(self, p: np.ndarray) -> np.ndarray:
         """(B,) energy of a handover (received, and passed on across the sensing range) and of hearing one period."""
-        r = self.scenario.radio
-        reach = 2 * self.scenario.detection.reach_m
-        send = 1e-9 * r.tx_nj_per_bit + 1e-12 * r.amplifier_pj_per_bit_m2 * reach**2
-        receive = 1e-9 * r.rx_nj_per_bit
-        return self.scenario.handover_bits * (send + receive) + r.report_bits * receive * (p > 0).sum(axis=1)
+        radio, bits = self.scenario.radio, self.scenario.handover_bits
+        handover = radio.receiving_j(bits) + radio.sending_j(bits, 2 * self.scenario.detection.reach_m)
+        return handover + radio.receiving_j(radio.report_bits) * (p > 0).sum(axis=1)

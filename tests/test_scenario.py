@@ -224,3 +224,10 @@ def test_as_dict_goes_into_json():
 def test_positions_can_be_changed_again():
     two = Scenario.named("PreDC-v0", positions=((1, 1), (2, 2)))
     assert two.override(positions=((1, 1), (2, 2), (3, 3))).field.nodes == 3
+
+
+def test_energies_of_the_papers_constants():
+    """512 bits over 10 m: 512 (50 nJ + 150 pJ 100) to send, 512 x 100 nJ to receive."""
+    radio = Scenario().radio
+    assert radio.sending_j(512, 10.0) == pytest.approx(33.28e-6, rel=1e-12)
+    assert radio.receiving_j(512) == pytest.approx(51.2e-6, rel=1e-12)

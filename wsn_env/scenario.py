@@ -236,6 +236,14 @@ class Radio(Section):
     sensing_nj: float = quantity(0.0, "energy of an awake node's sensing, per period", at_least=0)
     battery_j: float = quantity(1.0, "a node's energy at the start", above=0)
 
+    def sending_j(self, bits: float, distance_m: float) -> float:
+        """Energy of sending (eq. 5): bits (e1 + e2 d^2)."""
+        return bits * (1e-9 * self.tx_nj_per_bit + 1e-12 * self.amplifier_pj_per_bit_m2 * distance_m**2)
+
+    def receiving_j(self, bits: float) -> float:
+        """Energy of receiving (eq. 5): bits e_r."""
+        return bits * 1e-9 * self.rx_nj_per_bit
+
     @property
     def delivery(self) -> float:
         """Probability that a report arrives within all its tries."""
