@@ -10,44 +10,12 @@ import numpy as np
 
 from wsn_env import draws
 from wsn_env.interface import Interface, Settings
-from wsn_env.interface.render import frame
+from wsn_env.interface.info import measures
+from wsn_env.interface.render import check_render_mode, frame
 from wsn_env.scenario import Scenario
-from wsn_env.types import Outcome, State
+from wsn_env.types import State
 from wsn_env.view import View
 from wsn_env.world import World
-
-
-def resolve(scenario: str | Scenario, overrides: dict[str, Any]) -> Scenario:
-    """A scenario from a name or a value, with overrides by quantity; an unknown one raises and suggests."""
-    if isinstance(scenario, Scenario):
-        return scenario.override(**overrides)
-    return Scenario.named(scenario, **overrides)
-
-
-def measures(outcome: Outcome, state: State, reward: np.ndarray) -> dict[str, np.ndarray]:
-    """The info of a period, (B, ...) each. It carries truth: for loggers only, never for policies.
-
-    Args:
-        reward: (B,) of the period; its two parts are told apart here.
-    """
-    energy_mj = outcome.energy_mj
-    cost = state.lam * energy_mj
-    return {
-        "error_m": outcome.error_m,
-        "energy_mj": energy_mj,
-        "reward_error": reward + cost,
-        "reward_energy": -cost,
-        "members": outcome.members,
-        "delivered": outcome.delivered,
-        "dropped": outcome.dropped,
-        "handover": outcome.handover.astype(bool),
-        "searched": outcome.searched.astype(bool),
-        "n_eff": state.belief.n_eff.copy(),
-        "posterior_rms_m": outcome.posterior_rms_m,
-        "alive": outcome.alive,
-        "target_m": outcome.target_m,
-        "estimate_m": outcome.estimate_m,
-    }
 
 
 class ClusterEnv(gym.Env):
@@ -80,7 +48,7 @@ class ClusterEnv(gym.Env):
         **overrides,
     ):
         check_render_mode(render_mode, self.metadata)
-        self.scenario = resolve(scenario, overrides)
+        self.scenario = Scenario.of(scenario, **overrides)
         self.interface = Interface(self.scenario, Settings(action, observation, reward, order, candidates))
         self.world = World(self.scenario, threads=1)
         self.render_mode = render_mode
@@ -134,12 +102,6 @@ class ClusterEnv(gym.Env):
         self._view = View.of(self._state)
         arrays = self.interface.observation.encode(self._view)
         return _first(arrays) if isinstance(arrays, dict) else arrays[0]
-
-
-def check_render_mode(render_mode: str | None, metadata: dict) -> None:
-    """Raise ValueError unless the mode is one of the metadata's."""
-    if render_mode is not None and render_mode not in metadata["render_modes"]:
-        raise ValueError(f"render_mode = {render_mode!r}: allowed are None, {', '.join(metadata['render_modes'])}")
 
 
 def _first(arrays: dict[str, np.ndarray]) -> dict[str, Any]:

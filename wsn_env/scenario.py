@@ -331,6 +331,11 @@ class Scenario(Section):
         return self.radio.handover_bits if self.radio.handover == "estimate" else 5 * 32 * self.tracking.particles
 
     @classmethod
+    def of(cls, scenario: str | Scenario, /, **overrides) -> Scenario:
+        """A scenario from a preset's name or from a scenario, with overrides by quantity."""
+        return scenario.override(**overrides) if isinstance(scenario, cls) else cls.named(scenario, **overrides)
+
+    @classmethod
     def named(cls, name: str, /, **overrides) -> Scenario:
         """A preset, with overrides by quantity.
 

@@ -11,9 +11,9 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from wsn_env import draws
-from wsn_env.env import check_render_mode, measures, resolve
 from wsn_env.interface import Interface, Settings
-from wsn_env.interface.render import frame
+from wsn_env.interface.info import measures
+from wsn_env.interface.render import check_render_mode, frame
 from wsn_env.scenario import Scenario
 from wsn_env.types import State
 from wsn_env.view import View
@@ -54,7 +54,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = type(self).metadata | {"autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
-        self.scenario = resolve(scenario, overrides)
+        self.scenario = Scenario.of(scenario, **overrides)
         self.interface = Interface(self.scenario, Settings(action, observation, reward, order, candidates))
         self.world = World(self.scenario, threads)
         self.single_action_space = self.interface.action.space

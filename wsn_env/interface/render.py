@@ -20,6 +20,12 @@ MEMBER, HEAD, CLOUD, ESTIMATE, TRUTH, REPORT = (
 SIZE, MARGIN, SHOWN = 600, 24, 1000  # pixels; particles drawn at most
 
 
+def check_render_mode(render_mode: str | None, metadata: dict) -> None:
+    """Raise ValueError unless the mode is one of the metadata's."""
+    if render_mode is not None and render_mode not in metadata["render_modes"]:
+        raise ValueError(f"render_mode = {render_mode!r}: allowed are None, {', '.join(metadata['render_modes'])}")
+
+
 def frame(state: State, scenario: Scenario, row: int = 0) -> np.ndarray:
     """A frame (SIZE, SIZE, 3) uint8 of a row.
 
