@@ -14,6 +14,7 @@ FLOORS = {
     "wsn_env.progress": 0,
     "wsn_env.files": 0,
     "wsn_env.quantity": 0,
+    "wsn_env.sections": 1,
     "wsn_env.scenario": 1,
     "wsn_env.numerics": 1,
     "wsn_env.draws": 1,

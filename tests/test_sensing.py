@@ -8,7 +8,7 @@ from scipy import stats
 from wsn_env import Cluster, Scenario, World, draws
 from wsn_env.physics import sensing
 from wsn_env.physics.constants import constants
-from wsn_env.scenario import Detection
+from wsn_env.sections import Detection
 
 
 def test_detection_probability_with_table_1():

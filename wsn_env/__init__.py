@@ -13,7 +13,7 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "Scenario": "wsn_env.scenario",
-    "ScenarioError": "wsn_env.scenario",
+    "ScenarioError": "wsn_env.quantity",
     "World": "wsn_env.world",
     "View": "wsn_env.view",
     "State": "wsn_env.types",

@@ -12,7 +12,9 @@ import numpy as np
 from wsn_env import draws
 from wsn_env.compiling import piece
 from wsn_env.numerics import HALF_PI, sincos
-from wsn_env.scenario import MOTIONS, Recorded, Scenario, ScenarioError
+from wsn_env.quantity import ScenarioError
+from wsn_env.scenario import Scenario
+from wsn_env.sections import MOTIONS, Recorded
 
 CROSSING, STRAIGHT, SINE, CIRCLE, TURNS, WAYPOINT, RECORDED = range(len(MOTIONS))
 CROSSING_TRIES = 100

@@ -10,7 +10,7 @@ from wsn_env.compiling import lean_kernel, lean_piece
 from wsn_env.numerics import exp, log
 from wsn_env.physics.constants import CONSTANTS
 from wsn_env.physics.field import squared_distance
-from wsn_env.scenario import Detection
+from wsn_env.sections import Detection
 
 
 @lean_piece

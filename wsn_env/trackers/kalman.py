@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from wsn_env.scenario import Position, Rssi, Scenario
+from wsn_env.scenario import Scenario
+from wsn_env.sections import Position, Rssi
 from wsn_env.types import Belief, Network, Reports
 
 

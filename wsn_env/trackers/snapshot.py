@@ -1,6 +1,7 @@
 """The memoryless estimate of the paper's static-cluster system: the plain mean of a period's measurements."""
 
-from wsn_env.scenario import Position, Scenario
+from wsn_env.scenario import Scenario
+from wsn_env.sections import Position
 from wsn_env.types import Belief, Network, Reports
 
 

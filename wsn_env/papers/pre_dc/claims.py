@@ -15,7 +15,7 @@ from wsn_env.papers.pre_dc.systems import MOTIONS, NODES, PARTICLES, Results
 from wsn_env.papers.report import Claim, Expectation, verdict
 from wsn_env.papers.rollout import Record, standard_error
 from wsn_env.physics.sensing import detection_probability, joint_detection_probability
-from wsn_env.scenario import Detection
+from wsn_env.sections import Detection
 
 SIGNIFICANT = 2.0  # standard errors
 STABLE = 1.25  # the error is stable while no later quarter of a run exceeds the first by this factor

@@ -10,7 +10,7 @@ from wsn_env.papers.pre_dc.systems import MOTIONS, PARTICLES, SYSTEMS, Results
 from wsn_env.papers.report import Sheet, write_picture, write_sheet
 from wsn_env.papers.rollout import standard_error
 from wsn_env.physics.sensing import detection_probability
-from wsn_env.scenario import Detection
+from wsn_env.sections import Detection
 
 # Okabe and Ito's colours, which colour-blind readers tell apart; a system keeps its colour in every figure.
 STATIC, EKF, PRE_DC, GREEN, GREY = "#D55E00", "#0072B2", "#000000", "#009E73", "#999999"
