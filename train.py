@@ -32,7 +32,7 @@ from wsn_env.interface import Settings
 from wsn_env.policies import make_policy, policy_names
 from wsn_env.progress import progress_bar
 from wsn_env.quantity import check_quantity
-from wsn_env.reports import draw_front, print_tables
+from wsn_env.reports import draw_front, print_tables, save_markdown
 from wsn_env.vector_env import ClusterVectorEnv
 
 
@@ -254,6 +254,7 @@ def compare(settings: Training, scenario, policy: Path) -> None:
             policies, scenario, None, settings.episodes, settings.evaluation_seed, keep=folder, progress=report
         )
     evaluation.save(folder)
+    save_markdown(evaluation, folder)
     forget_blocks(folder)
     print_tables(evaluation, reference="ppo")
     draw_front(evaluation, settings.lam, folder / "comparison.png", emphasis="ppo")

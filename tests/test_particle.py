@@ -5,7 +5,7 @@ import pytest
 
 from wsn_env import Scenario
 from wsn_env.period import predict_moments
-from wsn_env.trackers.particle import ParticleTracker, weighted_cloud
+from wsn_env.trackers.particle import ParticleTracker
 from wsn_env.types import Belief, Network, Reports
 
 NODES = np.array([[40.0, 50.0], [55.0, 45.0], [52.0, 60.0], [47.0, 41.0]])
@@ -13,6 +13,12 @@ P0 = np.diag([1.0, 0.01, 1.0, 0.01])
 START = np.array([48.0, 0.5, 50.0, -0.4])
 F = np.array([[1, 1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 1], [0, 0, 0, 1.0]])
 G = np.array([[0.5, 0], [1, 0], [0, 0.5], [0, 1]])
+
+
+def weighted_cloud(belief, row=0):
+    """Particles (P, 4) and normalised weights (P,) of a row."""
+    weights = np.exp(belief.log_weights[row].astype(float))
+    return belief.particles[row].T.astype(float), weights / weights.sum()
 
 
 class Filter:

@@ -15,7 +15,7 @@ from wsn_env.scenario import Scenario
 
 @dataclass
 class Evaluate:
-    """Compare policies on common random episodes: a table, evaluation.csv and evaluation.json."""
+    """Compare policies on common random episodes: a table, and evaluation.csv, .json and .md."""
 
     scenario: str = "PreDC-v0"
     """Scenario id."""
@@ -66,7 +66,7 @@ def main(arguments: list[str] | None = None) -> int:
 def run_evaluate(command: Evaluate) -> None:
     """`wsn evaluate`."""
     from wsn_env.evaluation import evaluate, forget_blocks
-    from wsn_env.reports import print_tables
+    from wsn_env.reports import print_tables, save_markdown
 
     scenario = make_scenario(command.scenario, command.set, command.tracks)
     with progress_bar() as report:
@@ -82,6 +82,7 @@ def run_evaluate(command: Evaluate) -> None:
     print_tables(evaluation)
     if command.out:
         evaluation.save(command.out)
+        save_markdown(evaluation, command.out)
         forget_blocks(command.out)
         print(f"written: {command.out / 'evaluation.csv'}, {command.out / 'evaluation.json'}")
 

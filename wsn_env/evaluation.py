@@ -36,6 +36,7 @@ COLUMNS = (
 ).split()
 MEANS = ("return", "rms_m", "error_m", "energy_mj", "members", "handovers", "searches", "lost")
 RESAMPLES = 2000
+BLOCKS_FILE = "evaluation.blocks.jsonl"
 
 
 @dataclass(frozen=True)
@@ -234,7 +235,7 @@ class _Kept:
 
     def __init__(self, folder: str | Path | None, settings: dict, policies: Sequence[Policy]):
         self._blocks: dict[tuple, list[dict]] = {}
-        self._path = None if folder is None else Path(folder) / "evaluation.blocks.jsonl"
+        self._path = None if folder is None else Path(folder) / BLOCKS_FILE
         if self._path is None:
             return
         head = _digest(settings, policies)
@@ -261,14 +262,10 @@ class _Kept:
                 file.write(json.dumps([name, lam, number, measured]) + "\n")
         return measured
 
-    @staticmethod
-    def forget(folder: str | Path) -> None:
-        (Path(folder) / "evaluation.blocks.jsonl").unlink(missing_ok=True)
-
 
 def forget_blocks(folder: str | Path) -> None:
     """Remove the kept blocks of a finished run."""
-    _Kept.forget(folder)
+    (Path(folder) / BLOCKS_FILE).unlink(missing_ok=True)
 
 
 def _digest(settings: dict, policies: Sequence[Policy]) -> str:

@@ -73,6 +73,17 @@ def markdown_table(evaluation: Evaluation, lam: float, reference: str) -> str:
     return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in table_rows(evaluation, lam, reference)]) + "\n"
 
 
+def save_markdown(evaluation: Evaluation, folder: str | Path) -> None:
+    """Write evaluation.md: a table for each lam, compared with the first policy."""
+    parts = [
+        f"## {evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes\n\n"
+        + markdown_table(evaluation, lam, evaluation.policies[0])
+        for lam in evaluation.lams
+    ]
+    with replacing(Path(folder) / "evaluation.md") as path:
+        path.write_text("\n".join(parts))
+
+
 def draw_front(evaluation: Evaluation, lam: float, path: str | Path, emphasis: str | None = None) -> None:
     """Picture of mean error against energy with intervals, and the curve of equal return through one policy.
 

@@ -23,7 +23,6 @@ class Interface:
     """The three translations of an environment, bound to a scenario."""
 
     def __init__(self, scenario: Scenario, settings: Settings):
-        self.settings = settings
         self.action = make_action(settings.action, scenario, settings.order, settings.candidates)
         self.observation = make_observation(settings.observation, scenario, settings.candidates)
         self.reward = make_reward(settings.reward)

@@ -1,7 +1,5 @@
 """The cluster particle filter (Xiang & Guo, 2013, eqs. 9-15); its arithmetic stands in `kernels`."""
 
-import numpy as np
-
 from wsn_env.compiling import over_rows
 from wsn_env.physics.constants import constants
 from wsn_env.scenario import Scenario
@@ -44,9 +42,3 @@ class ParticleTracker:
             reports,
             resampled,
         )
-
-
-def weighted_cloud(belief: Belief, row: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Particles (P, 4) and normalised weights (P,) of a row, for pictures and tests."""
-    weights = np.exp(belief.log_weights[row].astype(float))
-    return belief.particles[row].T.astype(float), weights / weights.sum()
