@@ -64,10 +64,8 @@ class BareFilter:
         state, belief = self.state, self.state.belief
         state.reports.value[:, :4] = self.values[:, state.period[0]]
         state.period[:] += 1
-        positions = state.network.positions
-        filter_rows(
-            0, state.rows, self.constants, state.key, state.period, belief, positions, state.reports, self.resampled
-        )
+        told = (belief, state.network, state.reports)
+        filter_rows(0, state.rows, self.constants, state.key, state.period.copy(), *told, self.resampled)
         belief.predicted_mean[:] = belief.mean  # about which the next period's sums run
 
 

@@ -20,8 +20,8 @@ from wsn_env import Scenario, View, World, draws, make_policy
 HERE = Path(__file__).parents[1]
 ROWS = 8
 GOLDEN = {
-    "PreDC-v0": "9b4ad92618d510edb474147760f99a8ba0e7a569658939b438299017ad7b9aba",
-    "Rssi-v0": "dea0a973a53febe95528961b440878665dd9927e8ed6ac5ae655fb3d2f708481",
+    "PreDC-v0": "89cda4d94cb8242a78c2d3d206d12395c2a922889626186845f30d32bd846238",
+    "Rssi-v0": "082090700aad4cf0768f2f3a23bb2ffbec805c8f4f955fdf251c4de899c23340",
 }
 
 

@@ -66,7 +66,7 @@ def test_a_restarted_row_is_a_fresh_one(scenario, seed):
     world, rows = World(scenario, threads=1), np.array([True, False, True, True, False])
     restarted, _ = world.restart(used, rows, again)
     assert_same(living_entries(restarted), living_entries(world.reset(again)), rows, rows)
-    assert_same(restarted, used, ~rows, ~rows)
+    assert_same(restarted._replace(ledger=used.ledger), used, ~rows, ~rows)
     choice = choices(seed, 0, 5, scenario.field.nodes)
     assert_same(
         living_entries(world.step(restarted, choice)[0]),
@@ -137,9 +137,8 @@ def test_the_truth_does_not_show(scenario, seed):
     policies = [make_policy(name, scenario) for name in HAND_WRITTEN]
     rng = np.random.default_rng(seed)
     for _, _, state, _ in play(scenario, keys_of(seed, 3), seed):
-        false = state._replace(
-            track=rng.normal(0, 1e3, state.track.shape), key=keys_of(seed + 2, 3), last_search=state.last_search + 1
-        )
+        false = state.copy()._replace(track=rng.normal(0, 1e3, state.track.shape), key=keys_of(seed + 2, 3))
+        false.last_search[:] += 1
         for interface in interfaces:
             mine, theirs = View.of(state), View.of(false)
             assert_same(mine.as_arrays(), theirs.as_arrays())

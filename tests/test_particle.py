@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from tests.worlds import leaves
 from wsn_env import Scenario
 from wsn_env.period import predict_moments
 from wsn_env.trackers.particle import ParticleTracker
-from wsn_env.types import Belief, Network, Reports
+from wsn_env.types import State
 
 NODES = np.array([[40.0, 50.0], [55.0, 45.0], [52.0, 60.0], [47.0, 41.0]])
 P0 = np.diag([1.0, 0.01, 1.0, 0.01])
@@ -29,15 +30,10 @@ class Filter:
         self.tracker = ParticleTracker(self.scenario)
         particles, self.rows, self.period = self.tracker.particles, rows, 0
         self.keys = np.arange(key, key + rows).astype(np.uint64)
-        self.belief = Belief(
-            mean=np.tile(start, (rows, 1)),
-            cov=np.tile(cov, (rows, 1, 1)),
-            predicted_mean=np.zeros((rows, 4)),
-            predicted_cov=np.zeros((rows, 4, 4)),
-            n_eff=np.zeros(rows),
-            particles=np.zeros((rows, 4, particles), np.float32),
-            log_weights=np.zeros((rows, particles), np.float32),
-        )
+        self.state = State.zeros(rows, len(NODES), periods=1, particles=particles)
+        self.state.network.positions[:] = NODES
+        self.belief = self.state.belief
+        self.belief.mean[:], self.belief.cov[:] = start, cov
         self.tracker.start(self.keys, self._periods(), np.ones(rows, bool), self.belief)
         self._predict()
 
@@ -47,20 +43,17 @@ class Filter:
     def _predict(self):
         b = self.belief
         for row in range(self.rows):
-            predict_moments(
-                b.mean[row], b.cov[row], 1.0, self.scenario.filter_q, b.predicted_mean[row], b.predicted_cov[row]
-            )
+            q = self.scenario.filter_q
+            predict_moments(b.mean[row], b.cov[row], 1.0, q, b.predicted_mean[row], b.predicted_cov[row])
 
     def step(self, reports):
         """A period with [(node, x, y) or (node, strength, 0)]; returns which rows were resampled."""
         self.period += 1
-        n, rows = len(reports), self.rows
-        node, value = np.zeros((rows, len(NODES)), np.int32), np.zeros((rows, len(NODES), 2))
+        network, told = self.state.network, self.state.reports
+        told.count[:] = len(reports)
         for j, (i, *z) in enumerate(reports):
-            node[:, j], value[:, j] = i, z
-        network = Network(np.tile(NODES, (rows, 1, 1)), *[np.zeros(0)] * 5)
-        resampled = np.zeros(rows, bool)
-        told = Reports(np.full(rows, n), node, value)
+            told.node[:, j], told.value[:, j] = i, z
+        resampled = np.zeros(self.rows, bool)
         self.tracker.correct(self.keys, self._periods(), self.belief, network, told, resampled)
         self._predict()
         return resampled
@@ -284,7 +277,7 @@ def test_resampling_is_triggered_below_two_thirds():
 
 
 def assert_sane(belief):
-    for array in belief:
+    for _, array in leaves(belief):
         assert np.isfinite(array).all()
     assert (belief.log_weights <= 0).all() and (belief.n_eff >= 1 - 1e-6).all()
     assert (np.diagonal(belief.cov, axis1=1, axis2=2) >= 0).all()
@@ -352,9 +345,9 @@ def test_relocation_keeps_velocities_and_weights():
     belief = filter.belief
     belief.mean[:, ::2], belief.cov[:] = [20.0, 70.0], np.diag([25.0, 0.01, 9.0, 0.01])
     filter.tracker.relocate(filter.keys, np.ones(2, int), np.array([False, True]), belief)
-    np.testing.assert_array_equal(belief.particles[0], before[5][0])
-    np.testing.assert_array_equal(belief.particles[:, 1::2], before[5][:, 1::2])
-    np.testing.assert_array_equal(belief.log_weights, before[6])
+    np.testing.assert_array_equal(belief.particles[0], before[1][0])
+    np.testing.assert_array_equal(belief.particles[:, 1::2], before[1][:, 1::2])
+    np.testing.assert_array_equal(belief.log_weights, before[2])
     x, y = belief.particles[1, 0].astype(float), belief.particles[1, 2].astype(float)
     for z, mean, sd in ((x, 20, 5), (y, 70, 3)):
         assert abs(z.mean() - mean) < 4 * sd / 5000**0.5

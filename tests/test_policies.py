@@ -82,15 +82,10 @@ def test_pre_dc_passes_over_a_head_without_energy(view):
     battery = view.battery.copy()
     battery[np.arange(40), nearest] = 1e-6  # alive, but a handover costs more
     poor = View.of(walked())
-    poor = type(poor)(**{**vars_of(poor), "network": poor.network._replace(battery=battery)})
+    poor = View(poor.row, poor.belief, poor.network._replace(battery=battery), poor.reports)
     head = PreDC(SCENARIO, phi0_m=1e-9).act(poor).head
     assert (head != nearest).all()
     assert (head == poor.nearest(2)[0][:, 1]).all()
-
-
-def vars_of(view: View) -> dict:
-    names = "period lam luck log_miss mean cov predicted_mean predicted_cov network reports".split()
-    return {name: getattr(view, name) for name in names}
 
 
 def test_centroid_has_no_motion_model(view):

@@ -71,13 +71,16 @@ def play(scenario, keys, seed, threads=1, pick=None, donate=False):
 
 
 def leaves(value, path=""):
-    """(name, array) of all arrays in nested NamedTuples and dicts."""
+    """(name, array) of all arrays in nested NamedTuples and dicts; the fields of structured ones apart."""
     if isinstance(value, tuple):
         for name, part in zip(value._fields, value, strict=True):
             yield from leaves(part, f"{path}.{name}")
     elif isinstance(value, dict):
         for name, part in value.items():
             yield from leaves(part, f"{path}.{name}")
+    elif isinstance(value, np.ndarray) and value.dtype.names:
+        for name in value.dtype.names:
+            yield f"{path}.{name}", value[name]
     else:
         yield path, np.asarray(value)
 
@@ -97,4 +100,5 @@ def living_entries(state):
     stale = slots >= state.reports.count[:, None]
     state.reports.node[stale] = 0
     state.reports.value[stale] = 0
+    state.ledger.payer[slots >= state.ledger.count[:, None]] = 0
     return state

@@ -79,23 +79,23 @@ _pools: dict[int, ThreadPoolExecutor] = {}
 os.register_at_fork(after_in_child=_pools.clear)  # a child has none of its parent's threads
 
 
-def over_rows(kernel, rows: int, threads: int, *arguments) -> None:
+def over_rows(kernel, rows: int, threads: int, *arguments) -> int:
     """Call kernel(start, stop, *arguments) over 0..rows, shared among threads.
 
     Args:
         kernel: works on rows start..stop - 1 only.
         rows: B.
         threads: how many to use at most; a small batch stays in the caller's.
+
+    Returns: the sum of what the calls return (rows that they count), 0 for nothing.
     """
     if threads == 1 or rows <= SERIAL_ROWS:
-        kernel(0, rows, *arguments)
-        return
+        return kernel(0, rows, *arguments) or 0
     if threads not in _pools:
         _pools[threads] = ThreadPoolExecutor(threads, thread_name_prefix="wsn_env")
     bounds = [rows * i // threads for i in range(threads + 1)]
     jobs = [_pools[threads].submit(kernel, a, b, *arguments) for a, b in zip(bounds, bounds[1:]) if b > a]
-    for job in jobs:
-        job.result()
+    return sum(job.result() or 0 for job in jobs)
 
 
 def available_threads() -> int:

@@ -13,7 +13,7 @@ from wsn_env.interface import Interface, Settings
 from wsn_env.interface.info import measures
 from wsn_env.interface.render import check_render_mode, frame
 from wsn_env.scenario import Scenario
-from wsn_env.types import State
+from wsn_env.types import OUTCOME, Outcome, State
 from wsn_env.view import View
 from wsn_env.world import World
 
@@ -56,6 +56,7 @@ class ClusterEnv(gym.Env):
         self.observation_space = self.interface.observation.space
         self._state: State | None = None
         self._view: View | None = None
+        self._lam = 0.0
         self._squares = 0.0
 
     def reset(self, *, seed: int | None = None, options: dict | None = None):
@@ -64,26 +65,31 @@ class ClusterEnv(gym.Env):
         empty = self.world.reset([0]) if self._state is None else self._state
         key = draws.episode_key(self.np_random)
         self._state, outcome = self.world.restart(empty, [True], np.array([key]), donate=True)
+        self._lam = self._state.lam.item()
         self._squares = 0.0
-        return self._observe(), _first(measures(outcome, self._state, self.interface.reward(outcome, self._state.lam)))
+        return self._observe(), self._reward_and_info(outcome)[1]
 
     def step(self, action):
         """One period. Returns observation, reward, terminated (never), truncated, info."""
         if self._state is None:
             raise gym.error.ResetNeeded("call reset() before step()")
-        if self._state.period[0] >= self.scenario.periods:
+        if self._state.period.item() >= self.scenario.periods:
             raise gym.error.ResetNeeded(f"the episode ended after {self.scenario.periods} periods: call reset()")
         if not self.action_space.contains(action):
             raise ValueError(f"action {action!r} is not in {self.action_space}")
         cluster = self.interface.action.cluster(_batched(action), self._view)
         self._state, outcome = self.world.step(self._state, cluster, donate=True)
-        reward = self.interface.reward(outcome, self._state.lam)
-        self._squares += (outcome.error_m[0] * outcome.error_m[0]).item()
-        truncated = bool(self._state.period[0] >= self.scenario.periods)
-        info = _first(measures(outcome, self._state, reward))
+        reward, info = self._reward_and_info(outcome)
+        self._squares += info["error_m"] * info["error_m"]
+        truncated = self._state.period.item() >= self.scenario.periods
         if truncated:
             info["episode_rms_m"] = math.sqrt(self._squares / self.scenario.periods)
-        return self._observe(), float(reward[0]), False, truncated, info
+        return self._observe(), reward, False, truncated, info
+
+    def _reward_and_info(self, outcome: Outcome) -> tuple[float, dict[str, Any]]:
+        numbers = dict(zip(OUTCOME.names, outcome.row.item()))
+        reward = float(self.interface.reward(numbers, self._lam))
+        return reward, measures(numbers, self._lam, reward)
 
     def action_masks(self) -> np.ndarray:
         """Which entries of the action make sense now (flat bool, as sb3-contrib's MaskablePPO wants them)."""
@@ -101,12 +107,9 @@ class ClusterEnv(gym.Env):
     def _observe(self):
         self._view = View.of(self._state)
         arrays = self.interface.observation.encode(self._view)
-        return _first(arrays) if isinstance(arrays, dict) else arrays[0]
-
-
-def _first(arrays: dict[str, np.ndarray]) -> dict[str, Any]:
-    """The only row of (1, ...) arrays: arrays, or plain numbers."""
-    return {name: value[0] if value.ndim > 1 else value[0].item() for name, value in arrays.items()}
+        if isinstance(arrays, dict):
+            return {name: value[0] if value.ndim > 1 else value.item() for name, value in arrays.items()}
+        return arrays[0]
 
 
 def _batched(action):

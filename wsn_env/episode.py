@@ -5,8 +5,9 @@ import numpy as np
 from wsn_env import draws
 from wsn_env.compiling import kernel, piece
 from wsn_env.numerics import exp, log
-from wsn_env.physics.field import scatter
+from wsn_env.physics.field import index_nodes, scatter
 from wsn_env.physics.motion import draw_track
+from wsn_env.physics.radio import close_books
 from wsn_env.scenario import Scenario
 
 START = np.dtype(
@@ -50,32 +51,31 @@ def begin(start, stop, cs, rows, keys, motion, numbers, recordings, starts, plac
     """Field, track, batteries, lam and the first belief of new episodes."""
     c, s = cs[0], starts[0]
     for b in range(start, stop):
+        close_books(state.ledger, b)
         if not rows[b]:
             continue
-        key = keys[b]
+        key, row, network, belief = keys[b], state.row[b], state.network, state.belief.row[b]
         state.key[b] = key
-        state.period[b] = 0
-        state.log_miss[b] = 0.0
-        state.last_search[b] = -c.search_gap
-        state.lam[b] = s.low
+        row.period = 0
+        row.log_miss = 0.0
+        row.last_search = -c.search_gap
+        row.lam = s.low
         if s.high > s.low:
-            ratio = log(s.high / s.low)
-            state.lam[b] = s.low * exp(ratio * draws.uniform(draws.stream(key, 0, draws.LAM), 0))
-        network = state.network
+            row.lam = s.low * exp(log(s.high / s.low) * draws.uniform(draws.stream(key, 0, draws.LAM), 0))
         if len(placed) > 0:
             network.positions[b] = placed
         else:
             scatter(draws.stream(s.field_key if s.seeded else key, 0, draws.FIELD), c.side_m, network.positions[b])
+        index_nodes(network.positions[b], network.grid, b)
         network.battery[b] = s.battery
-        network.alive[b] = len(network.battery[b])
-        network.head[b] = -1
-        network.n_members[b] = 0
+        network.row[b].alive = network.battery.shape[1]
+        network.row[b].head = -1
+        network.row[b].n_members = 0
         state.reports.count[b] = 0
-        state.belief.n_eff[b] = state.belief.particles.shape[2]
+        belief.n_eff = state.belief.particles.shape[2]
         track_stream = draws.stream(key, 0, draws.TRACK)
         draw_track(motion, numbers, recordings, track_stream, c.period_s, c.side_m, state.track[b])
-        mean, cov = state.belief.mean[b], state.belief.cov[b]
-        _first_belief(draws.stream(key, 0, draws.START), state.track[b, 0], s, c, mean, cov)
+        _first_belief(draws.stream(key, 0, draws.START), state.track[b, 0], s, c, belief.mean, belief.cov)
 
 
 @piece

@@ -3,97 +3,154 @@
 import numpy as np
 
 from wsn_env import draws
-from wsn_env.compiling import lean_kernel, lean_piece
+from wsn_env.compiling import kernel, lean_kernel, lean_piece
 from wsn_env.physics import radio, sensing
 from wsn_env.physics.field import nearest_living, squared_distance
+from wsn_env.trackers.kernels import filter_row, scratch
+from wsn_env.types import KEEP_CLUSTER, KEEP_HEAD
+
+
+@kernel
+def run(start, stop, cs, heads, chosen, lost, state, outcome):
+    """A period with the particle filter at the head, up to where some rows must search; returns how many."""
+    weights, ancestors = scratch(state.belief.particles.shape[2])
+    count = 0
+    for b in range(start, stop):
+        _sense_and_report(heads[b], chosen[b], state, outcome, b, cs[0])
+        resampled = filter_row(
+            state.key[b],
+            state.row[b].period,
+            state.belief,
+            state.network,
+            state.reports,
+            b,
+            cs[0],
+            weights,
+            ancestors,
+        )
+        lost[b] = _conclude(resampled, state, outcome, b, cs[0])
+        count += lost[b]
+    return count
+
+
+@lean_kernel
+def sense_and_report(start, stop, cs, heads, chosen, state, outcome):
+    """What comes before the correction, for a tracker that is not compiled."""
+    for b in range(start, stop):
+        _sense_and_report(heads[b], chosen[b], state, outcome, b, cs[0])
+
+
+@lean_kernel
+def conclude(start, stop, cs, resampled, lost, state, outcome):
+    """What comes after it; returns how many rows must search."""
+    count = 0
+    for b in range(start, stop):
+        lost[b] = _conclude(resampled[b], state, outcome, b, cs[0])
+        count += lost[b]
+    return count
 
 
 @lean_piece
 def _target(state, b):
     """The true position (x, y) in the present period [m]."""
-    k = min(state.period[b], state.track.shape[1] - 1)
+    k = min(state.row[b].period, state.track.shape[1] - 1)
     return state.track[b, k, 0], state.track[b, k, 2]
 
 
-@lean_kernel
-def sense_and_report(start, stop, cs, heads, chosen, state, outcome):
+@lean_piece
+def _sense_and_report(head, chosen, state, outcome, b, c):
     """From the choice to the reports: cluster, target, detections, packets, and what was missed.
 
     A head that dies of what it receives still corrects with what it has heard until then.
     """
-    c = cs[0]
     network, reports = state.network, state.reports
-    for b in range(start, stop):
-        state.period[b] += 1
-        _take_choice(heads[b], chosen[b], network, state.belief, outcome, b, c)  # handover, invitations [J]
-        target = _target(state, b)  # moves
-        reports.count[b] = 0
-        head = network.head[b]
-        if head >= 0:
-            # In the order of their numbers, the head in its place among the members.
-            members, n = network.members[b], network.n_members[b]
-            place = 0
-            while place < n and members[place] < head:
-                place += 1
-            for k in range(n + 1):
-                node = head if k == place else members[k - (k > place)]
-                if _wake(node, radio.SENSING, network, outcome, b, c):
-                    _detect_and_report(node, head, radio.REPORT, target, state, outcome, b, c)
-        _remember_miss(state, b, c)
+    radio.close_books(state.ledger, b)
+    _take_choice(head, chosen, state, outcome, b, c)  # handover, invitations [J]
+    state.row[b].period += 1
+    target = _target(state, b)  # moves
+    reports.count[b] = 0
+    head, n, members = network.row[b].head, network.row[b].n_members, network.members[b]
+    if head >= 0:
+        # In the order of their numbers, the head in its place among the members.
+        place = 0
+        while place < n and members[place] < head:
+            place += 1
+        for k in range(n + 1):
+            node = head if k == place else members[k - (k > place)]
+            if _wake(node, radio.SENSING, state, outcome, b, c):
+                _detect_and_report(node, head, radio.REPORT, target, state, outcome, b, c)
+    _remember_miss(state, b, c)
 
 
 @lean_piece
-def _take_choice(head, chosen, network, belief, outcome, b, c):
+def _take_choice(head, chosen, state, outcome, b, c):
     """Drop what cannot serve, then form the cluster."""
-    battery = network.battery[b]
+    network, out = state.network, outcome.row[b]
+    standing, battery, predicted = network.row[b], network.battery[b], state.belief.row[b].predicted_mean
+    stands = standing.head >= 0 and battery[standing.head] > 0.0
+    if head == KEEP_CLUSTER and stands:
+        out.members = 1 + standing.n_members
+        return
     wanted = 0
     for node in chosen:
         wanted += node != -1
-    valid_head = 0 <= head < len(battery) and battery[head] > 0.0
-    if not valid_head:
-        outcome.dropped[b] += head != -1
-        head = network.head[b]
-        if head < 0 or battery[head] <= 0.0:
-            head = nearest_living(
-                network.positions[b], battery, belief.predicted_mean[b, 0], belief.predicted_mean[b, 2]
-            )
-    count = radio.standing_members(chosen, battery)
-    outcome.dropped[b] += wanted - count
+    if head < 0 or head >= len(battery) or battery[head] <= 0.0:
+        out.dropped += head != KEEP_HEAD and head != KEEP_CLUSTER
+        head = standing.head if stands else nearest_living(network.positions[b], battery, predicted[0], predicted[2])
+    wished = state.reports.node[b]  # room for a list: the last period's reports have done their service
+    count = _list_living(chosen, battery, wished)
+    out.dropped += wanted - count
     if head < 0:  # nobody is alive
-        network.head[b] = -1
-        network.n_members[b] = 0
+        standing.head = -1
+        standing.n_members = 0
         return
     kept = 0
     for k in range(count):
-        if chosen[k] != head:
-            chosen[kept] = chosen[k]
+        if wished[k] != head:
+            wished[kept] = wished[k]
             kept += 1
-    handed = radio.form(head, chosen, kept, network, b, outcome.spent_j[b], outcome.energy_j[b], c)
-    outcome.handover[b] = handed
-    outcome.members[b] = 1 + network.n_members[b]
+    out.handover = radio.form(head, wished, kept, state, outcome, b, c)
+    out.members = 1 + standing.n_members
 
 
 @lean_piece
-def _wake(node, purpose, network, outcome, b, c):
+def _list_living(chosen, battery, found):
+    """The living among the chosen in ascending order, each once, in `found`; their number.
+
+    Sorts by insertion: the chosen are few, or sorted.
+    """
+    count = 0
+    for node in chosen:
+        if not 0 <= node < len(battery) or battery[node] <= 0.0:
+            continue
+        k = count
+        while k > 0 and found[k - 1] > node:
+            k -= 1
+        if k > 0 and found[k - 1] == node:
+            continue
+        for j in range(count, k, -1):
+            found[j] = found[j - 1]
+        found[k] = node
+        count += 1
+    return count
+
+
+@lean_piece
+def _wake(node, purpose, state, outcome, b, c):
     """A node pays for sensing in this period. Returns whether it could."""
-    battery = network.battery[b]
-    return battery[node] > 0.0 and radio.spend(
-        node, c.sensing_j, purpose, battery, outcome.spent_j[b], outcome.energy_j[b]
-    )
+    return state.network.battery[b, node] > 0.0 and radio.spend(node, c.sensing_j, purpose, state, outcome, b)
 
 
 @lean_piece
 def _detect_and_report(node, head, purpose, target, state, outcome, b, c):
     """An awake node's period: detect, measure, report."""
-    network, reports = state.network, state.reports
-    positions, battery = network.positions[b], network.battery[b]
-    spent, energy = outcome.spent_j[b], outcome.energy_j[b]
-    key, period = state.key[b], state.period[b]
+    positions, battery, reports = state.network.positions[b], state.network.battery[b], state.reports
+    key, period = state.key[b], state.row[b].period
     distance = np.sqrt(squared_distance(positions, node, target[0], target[1]))
     if battery[node] <= 0.0 or not sensing.detects(key, period, node, distance, c):
         return
-    outcome.detections[b] += 1
-    if battery[head] > 0.0 and radio.report(key, period, node, head, purpose, positions, battery, spent, energy, c):
+    outcome.row[b].detections += 1
+    if battery[head] > 0.0 and radio.report(node, head, purpose, state, outcome, b, c):
         slot = reports.count[b]
         reports.node[b, slot] = node
         sensing.measure(key, period, node, positions, target, c, reports.value[b, slot])
@@ -103,51 +160,43 @@ def _detect_and_report(node, head, purpose, target, state, outcome, b, c):
 @lean_piece
 def _remember_miss(state, b, c):
     """How improbable the silence since the last report is, seen from the belief."""
-    network, belief = state.network, state.belief
     if state.reports.count[b] > 0:
-        state.log_miss[b] = 0.0
+        state.row[b].log_miss = 0.0
     else:
-        state.log_miss[b] += sensing.log_miss_probability(
-            belief.predicted_mean[b],
-            belief.predicted_cov[b],
+        network, belief = state.network, state.belief.row[b]
+        standing = network.row[b]
+        state.row[b].log_miss += sensing.log_miss_probability(
+            belief.predicted_mean,
+            belief.predicted_cov,
             network.positions[b],
             network.members[b],
-            network.n_members[b],
-            network.head[b],
+            standing.n_members,
+            standing.head,
             c,
         )
 
 
-@lean_kernel
-def conclude(start, stop, cs, resampled, lost, state, outcome):
-    """After the correction: the broadcast, and the end of the period unless a search must come first.
-
-    Args:
-        resampled: (B,) bool.
-        lost: (B,) bool, filled: which rows have to search.
-    """
-    c = cs[0]
-    network = state.network
-    for b in range(start, stop):
-        head = network.head[b]
-        if resampled[b] and head >= 0:
-            outcome.resampled[b] = 1
-            members, count = network.members[b], network.n_members[b]
-            spent, energy = outcome.spent_j[b], outcome.energy_j[b]
-            radio.broadcast(head, members, count, network.positions[b], network.battery[b], spent, energy, c)
-        lost[b] = _is_lost(state, b, c)
-        if not lost[b]:
-            _settle(state, outcome, b, c)
+@lean_piece
+def _conclude(resampled, state, outcome, b, c):
+    """After the correction: the broadcast, and the end of the period unless a search must come first; returns
+    whether it must."""
+    if resampled and state.network.row[b].head >= 0:
+        outcome.row[b].resampled = True
+        radio.broadcast(state, outcome, b, c)
+    lost = _is_lost(state, b, c)
+    if not lost:
+        _settle(state, outcome, b, c)
+    return lost
 
 
 @lean_piece
 def _is_lost(state, b, c):
     """The search rule: too long a silence, or a belief wider than a node's radius; not twice within the gap."""
-    cov = state.belief.cov[b]
+    cov, row = state.belief.row[b].cov, state.row[b]
     wide = max(cov[0, 0], cov[2, 2]) > c.radius_m * c.radius_m
-    rested = state.period[b] - state.last_search[b] >= c.search_gap
-    someone = state.network.alive[b] > 0
-    return c.search != 0 and rested and someone and (wide or state.log_miss[b] < c.log_search_miss)
+    rested = row.period - row.last_search >= c.search_gap
+    someone = state.network.row[b].alive > 0
+    return c.search != 0 and rested and someone and (wide or row.log_miss < c.log_search_miss)
 
 
 @lean_kernel
@@ -162,17 +211,16 @@ def search(start, stop, cs, rows, found, state, outcome):
     for b in range(start, stop):
         if not rows[b]:
             continue
-        outcome.searched[b] = 1
-        state.last_search[b] = state.period[b]
+        outcome.row[b].searched = True
+        state.row[b].last_search = state.row[b].period
         strongest = _wake_all(state, outcome, b, c)
         if strongest >= 0:
             # The new head takes over (the velocity is handed to it) and hears the others.
-            network, spent, energy = state.network, outcome.spent_j[b], outcome.energy_j[b]
-            nobody = network.members[b, :0]
-            outcome.handover[b] |= radio.form(strongest, nobody, 0, network, b, spent, energy, c)
-            outcome.detections[b] = 0
+            if radio.form(strongest, state.reports.node[b], 0, state, outcome, b, c):
+                outcome.row[b].handover = True
+            outcome.row[b].detections = 0
             state.reports.count[b] = 0
-            for node in range(len(network.battery[b])):
+            for node in range(state.network.battery.shape[1]):
                 _detect_and_report(node, strongest, radio.SEARCH, _target(state, b), state, outcome, b, c)
             found[b] = _restart_at_centroid(state, b, c)
 
@@ -184,23 +232,21 @@ def _wake_all(state, outcome, b, c):
     Returns: the living node with the strongest signal of the target, which is the nearest that detects it, or the one
     that measured the greatest strength; -1: nobody detects it.
     """
-    network = state.network
-    positions, battery = network.positions[b], network.battery[b]
-    spent, energy = outcome.spent_j[b], outcome.energy_j[b]
-    members, head, n = network.members[b], network.head[b], network.n_members[b]
-    key, period, target = state.key[b], state.period[b], _target(state, b)
+    network, standing = state.network, state.network.row[b]
+    positions, battery, members = network.positions[b], network.battery[b], network.members[b]
+    key, period, target = state.key[b], state.row[b].period, _target(state, b)
     call = c.wakeup_bits * c.rx_j_per_bit
     strongest, best, j = -1, -np.inf, 0
-    outcome.members[b] = 0
+    outcome.row[b].members = 0
     for node in range(len(battery)):
-        while j < n and members[j] < node:
+        while j < standing.n_members and members[j] < node:
             j += 1
-        awake = node == head or (j < n and members[j] == node)
-        if battery[node] <= 0.0 or not radio.spend(node, call, radio.SEARCH, battery, spent, energy):
+        awake = node == standing.head or (j < standing.n_members and members[j] == node)
+        if battery[node] <= 0.0 or not radio.spend(node, call, radio.SEARCH, state, outcome, b):
             continue
-        if not awake and not _wake(node, radio.SEARCH, network, outcome, b, c):
+        if not awake and not _wake(node, radio.SEARCH, state, outcome, b, c):
             continue
-        outcome.members[b] += 1
+        outcome.row[b].members += 1
         squared = squared_distance(positions, node, target[0], target[1])
         if battery[node] > 0.0 and sensing.detects(key, period, node, np.sqrt(squared), c):
             signal = -squared if c.model == 0 else sensing.measured_strength(key, period, node, squared, c)
@@ -220,14 +266,14 @@ def _restart_at_centroid(state, b, c):
     for k in range(heard):
         x += positions[state.reports.node[b, k], 0]
         y += positions[state.reports.node[b, k], 1]
-    mean, cov = state.belief.mean[b], state.belief.cov[b]
+    mean, cov = state.belief.row[b].mean, state.belief.row[b].cov
     mean[0], mean[2] = x / heard, y / heard
     for axis in (0, 2):
         for other in range(4):
             cov[axis, other] = 0.0
             cov[other, axis] = 0.0
     cov[0, 0] = cov[2, 2] = c.radius_m * c.radius_m / heard
-    state.log_miss[b] = 0.0
+    state.row[b].log_miss = 0.0
     return True
 
 
@@ -242,32 +288,38 @@ def settle(start, stop, cs, rows, state, outcome):
 @lean_piece
 def _settle(state, outcome, b, c):
     """The dead, the costs, and the prediction for the next period (eq. 16)."""
-    network, belief = state.network, state.belief
-    _bury(network, outcome, b)
-    mean, cov, target = belief.mean[b], belief.cov[b], _target(state, b)
-    outcome.target_m[b, 0], outcome.target_m[b, 1] = target[0], target[1]
-    outcome.estimate_m[b, 0], outcome.estimate_m[b, 1] = mean[0], mean[2]
-    outcome.error_m[b] = np.sqrt((mean[0] - target[0]) ** 2 + (mean[2] - target[1]) ** 2)
-    outcome.posterior_rms_m[b] = np.sqrt(cov[0, 0] + cov[2, 2])
-    outcome.delivered[b] = state.reports.count[b]
-    outcome.alive[b] = network.alive[b]
-    luck = draws.bits(draws.stream(state.key[b], state.period[b], draws.POLICY), 0)
-    state.luck[b] = np.uint32(luck >> np.uint64(32))
-    predict_moments(mean, cov, c.period_s, c.q, belief.predicted_mean[b], belief.predicted_cov[b])
+    belief, out, target = state.belief.row[b], outcome.row[b], _target(state, b)
+    mean, cov = belief.mean, belief.cov
+    _bury(state.network, b)
+    total = 0.0
+    for joules in out.energy_j:
+        total += joules
+    out.energy_mj = 1e3 * total
+    out.target_m[0], out.target_m[1] = target[0], target[1]
+    out.estimate_m[0], out.estimate_m[1] = mean[0], mean[2]
+    out.error_m = np.sqrt((mean[0] - target[0]) ** 2 + (mean[2] - target[1]) ** 2)
+    out.posterior_rms_m = np.sqrt(cov[0, 0] + cov[2, 2])
+    out.n_eff = belief.n_eff
+    out.delivered = state.reports.count[b]
+    out.alive = state.network.row[b].alive
+    luck = draws.bits(draws.stream(state.key[b], state.row[b].period, draws.POLICY), 0)
+    state.row[b].luck = np.uint32(luck >> np.uint64(32))
+    predict_moments(mean, cov, c.period_s, c.q, belief.predicted_mean, belief.predicted_cov)
 
 
 @lean_piece
-def _bury(network, outcome, b):
-    """Count who died of this period's costs, and take the dead out of the cluster."""
-    battery = network.battery[b]
-    if not outcome.energy_j[b].any():
-        return
-    for node in range(len(battery)):
-        network.alive[b] -= outcome.spent_j[b, node] > 0.0 and battery[node] <= 0.0
-    if network.head[b] >= 0 and battery[network.head[b]] <= 0.0:
-        network.head[b] = -1
-        network.n_members[b] = 0
-    network.n_members[b] = radio.standing_members(network.members[b, : network.n_members[b]], battery)
+def _bury(network, b):
+    """Take the dead out of the cluster."""
+    standing, battery, members = network.row[b], network.battery[b], network.members[b]
+    if standing.head >= 0 and battery[standing.head] <= 0.0:
+        standing.head = -1
+        standing.n_members = 0
+    living = 0
+    for k in range(standing.n_members):
+        if battery[members[k]] > 0.0:
+            members[living] = members[k]
+            living += 1
+    standing.n_members = living
 
 
 @lean_piece

@@ -1,6 +1,8 @@
 """The values that flow through the house, batch-first: B rows, S nodes, P particles.
 
-They are NamedTuples of arrays, so that compiled kernels take them as they are.
+They are NamedTuples of arrays, so that compiled kernels take them as they are. Handing one over costs by the number
+of arrays, so all that is a number or a small matrix a row shares one structured array, `row` (B,). Its fields read as
+attributes: `belief.mean` is `belief.row["mean"]`, (B, 4); kernels write `belief.row[b].mean`.
 """
 
 from __future__ import annotations
@@ -10,16 +12,32 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 
-class Belief(NamedTuple):
-    """What the head believes about the target: state (x, vx, y, vy) in m and m/s."""
+def _of_row(self, name: str) -> np.ndarray:
+    if name in self.row.dtype.names:
+        return self.row[name]
+    raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}")
 
-    mean: np.ndarray  # (B, 4) after the period's correction
-    cov: np.ndarray  # (B, 4, 4)
-    predicted_mean: np.ndarray  # (B, 4) for the period to come
-    predicted_cov: np.ndarray  # (B, 4, 4)
-    n_eff: np.ndarray  # (B,) effective sample size before resampling; 0 for trackers without particles
+
+BELIEF = np.dtype(
+    [
+        ("mean", "f8", 4),  # x, vx, y, vy in m and m/s, after the period's correction
+        ("cov", "f8", (4, 4)),
+        ("predicted_mean", "f8", 4),  # for the period to come
+        ("predicted_cov", "f8", (4, 4)),
+        ("n_eff", "f8"),  # effective sample size before resampling; 0 for trackers without particles
+    ],
+    align=True,
+)
+
+
+class Belief(NamedTuple):
+    """What the head believes about the target."""
+
+    row: np.ndarray  # (B,) BELIEF
     particles: np.ndarray  # (B, 4, P) float32; P = 0 for trackers without
     log_weights: np.ndarray  # (B, P) float32, at most 0
+
+    __getattr__ = _of_row
 
 
 class Reports(NamedTuple):
@@ -30,30 +48,81 @@ class Reports(NamedTuple):
     value: np.ndarray  # (B, S, 2): x, y [m]; or the strength and 0
 
 
+GRID = np.dtype([("x_m", "f8"), ("y_m", "f8"), ("cell_m", "f8"), ("side", "i8")], align=True)
+
+
+class Grid(NamedTuple):
+    """The nodes by square cells, side x side of them, so that near ones are found without looking at all."""
+
+    row: np.ndarray  # (B,) GRID: lower left corner, width of a cell, cells a side
+    nodes: np.ndarray  # (B, S) int32, cell by cell
+    starts: np.ndarray  # (B, side^2 + 1) int32: where in `nodes` each cell begins
+
+    NODES_A_CELL = 4
+
+    @classmethod
+    def zeros(cls, rows: int, nodes: int) -> Grid:
+        """Of the right shapes, before `physics.field.index_nodes`."""
+        side = max(1, int((nodes / cls.NODES_A_CELL) ** 0.5))
+        row = np.zeros(rows, GRID)
+        row["side"] = side
+        return cls(row, np.zeros((rows, nodes), np.int32), np.zeros((rows, side * side + 1), np.int32))
+
+
+NETWORK = np.dtype(
+    [
+        ("alive", "i8"),  # living nodes
+        ("head", "i8"),  # -1: none
+        ("n_members", "i8"),
+    ],
+    align=True,
+)
+
+
 class Network(NamedTuple):
     """Nodes, batteries and the standing cluster."""
 
+    row: np.ndarray  # (B,) NETWORK
     positions: np.ndarray  # (B, S, 2) m, fixed for an episode
     battery: np.ndarray  # (B, S) J; a node is alive while it has any
-    alive: np.ndarray  # (B,) living nodes
-    head: np.ndarray  # (B,) int64, -1: none
     members: np.ndarray  # (B, S) int32: the first n_members ascending, without the head
-    n_members: np.ndarray  # (B,)
+    grid: Grid
+
+    __getattr__ = _of_row
+
+
+class Ledger(NamedTuple):
+    """Who paid in the last period."""
+
+    count: np.ndarray  # (B,) how many nodes did
+    payer: np.ndarray  # (B, S) int32: the first `count`
+    spent_j: np.ndarray  # (B, S) J by node: exactly what the batteries lost
+
+
+STATE = np.dtype(
+    [
+        ("period", "i8"),  # periods done
+        ("lam", "f8"),  # m/mJ
+        ("log_miss", "f8"),  # log probability of having missed the target ever since the last report
+        ("last_search", "i8"),  # period of the last search
+        ("luck", "u4"),  # a random number of the period, for policies that want one
+    ],
+    align=True,
+)
 
 
 class State(NamedTuple):
     """A whole world: copy it, store it, step it again. Nothing is hidden elsewhere."""
 
     key: np.ndarray  # (B,) uint64: all randomness of the episode
-    period: np.ndarray  # (B,) periods done
-    lam: np.ndarray  # (B,) m/mJ
     track: np.ndarray  # (B, periods + 1, 4): the target's true states, drawn at the start
-    log_miss: np.ndarray  # (B,) log probability of having missed the target ever since the last report
-    last_search: np.ndarray  # (B,) period of the last search
-    luck: np.ndarray  # (B,) uint32: a random number of the period, for policies that want one
+    row: np.ndarray  # (B,) STATE: what the network knows beside the following
     network: Network
+    ledger: Ledger
     reports: Reports
     belief: Belief
+
+    __getattr__ = _of_row
 
     @property
     def rows(self) -> int:
@@ -63,35 +132,24 @@ class State(NamedTuple):
     @classmethod
     def zeros(cls, rows: int, nodes: int, periods: int, particles: int) -> State:
         """Of the right shapes, before an episode begins."""
-        network = Network(
-            positions=np.zeros((rows, nodes, 2)),
-            battery=np.zeros((rows, nodes)),
-            alive=np.zeros(rows, np.int64),
-            head=np.zeros(rows, np.int64),
-            members=np.zeros((rows, nodes), np.int32),
-            n_members=np.zeros(rows, np.int64),
-        )
-        reports = Reports(np.zeros(rows, np.int64), np.zeros((rows, nodes), np.int32), np.zeros((rows, nodes, 2)))
-        belief = Belief(
-            mean=np.zeros((rows, 4)),
-            cov=np.zeros((rows, 4, 4)),
-            predicted_mean=np.zeros((rows, 4)),
-            predicted_cov=np.zeros((rows, 4, 4)),
-            n_eff=np.zeros(rows),
-            particles=np.zeros((rows, 4, particles), np.float32),
-            log_weights=np.zeros((rows, particles), np.float32),
-        )
         return cls(
             key=np.zeros(rows, np.uint64),
-            period=np.zeros(rows, np.int64),
-            lam=np.zeros(rows),
             track=np.zeros((rows, periods + 1, 4)),
-            log_miss=np.zeros(rows),
-            last_search=np.zeros(rows, np.int64),
-            luck=np.zeros(rows, np.uint32),
-            network=network,
-            reports=reports,
-            belief=belief,
+            row=np.zeros(rows, STATE),
+            network=Network(
+                row=np.zeros(rows, NETWORK),
+                positions=np.zeros((rows, nodes, 2)),
+                battery=np.zeros((rows, nodes)),
+                members=np.zeros((rows, nodes), np.int32),
+                grid=Grid.zeros(rows, nodes),
+            ),
+            ledger=Ledger(np.zeros(rows, np.int64), np.zeros((rows, nodes), np.int32), np.zeros((rows, nodes))),
+            reports=Reports(np.zeros(rows, np.int64), np.zeros((rows, nodes), np.int32), np.zeros((rows, nodes, 2))),
+            belief=Belief(
+                row=np.zeros(rows, BELIEF),
+                particles=np.zeros((rows, 4, particles), np.float32),
+                log_weights=np.zeros((rows, particles), np.float32),
+            ),
         )
 
     def copy(self) -> State:
@@ -103,10 +161,13 @@ def _copied(value):
     return type(value)(*map(_copied, value)) if isinstance(value, tuple) else value.copy()
 
 
+KEEP_HEAD, KEEP_CLUSTER = -1, -2
+
+
 class Cluster(NamedTuple):
     """A choice: a head and its members."""
 
-    head: np.ndarray  # (B,) node; -1: keep the head
+    head: np.ndarray  # (B,) node; KEEP_HEAD; or KEEP_CLUSTER: head and members stay as they are
     members: np.ndarray  # (B, M) nodes, -1: no entry; the head may be among them, it always senses
 
     @classmethod
@@ -126,46 +187,37 @@ class Cluster(NamedTuple):
         return cls(np.asarray(head, dtype=np.int64), members)
 
 
-class Outcome(NamedTuple):
-    """What a period brought and cost; for rewards and loggers, never for policies. Each (B,) unless said."""
-
-    error_m: np.ndarray  # distance between the estimate and the target after the correction
-    energy_j: np.ndarray  # (B, 6) by purpose, see PURPOSES
-    spent_j: np.ndarray  # (B, S) by node: exactly what the batteries lost
-    members: np.ndarray  # awake nodes, head included; all that woke in a search
-    detections: np.ndarray  # awake nodes that detected
-    delivered: np.ndarray  # reports the head had, its own included
-    dropped: np.ndarray  # chosen nodes that were dead or named twice or out of range
-    handover: np.ndarray  # 1 when the head's role went to another node
-    searched: np.ndarray  # 1 when there was a search
-    resampled: np.ndarray  # 1 when the particles were resampled
-    alive: np.ndarray  # living nodes after the period
-    posterior_rms_m: np.ndarray  # sqrt(trace of the belief's position covariance)
-    target_m: np.ndarray  # (B, 2) the truth
-    estimate_m: np.ndarray  # (B, 2)
-
-    @classmethod
-    def zeros(cls, rows: int, nodes: int) -> Outcome:
-        """Of the right shapes, before a period."""
-        counts = {name: np.zeros(rows, np.int64) for name in COUNTS}
-        return cls(
-            error_m=np.zeros(rows),
-            energy_j=np.zeros((rows, len(PURPOSES))),
-            spent_j=np.zeros((rows, nodes)),
-            posterior_rms_m=np.zeros(rows),
-            target_m=np.zeros((rows, 2)),
-            estimate_m=np.zeros((rows, 2)),
-            **counts,
-        )
-
-    @property
-    def energy_mj(self) -> np.ndarray:
-        """(B,) energy of the period in mJ, summed in the fixed order of PURPOSES."""
-        return 1e3 * self.energy_j.cumsum(axis=1)[:, -1]
-
-
-COUNTS = ("members", "detections", "delivered", "dropped", "handover", "searched", "resampled", "alive")
 PURPOSES = ("sensing", "handover", "invitation", "report", "broadcast", "search")
+
+OUTCOME = np.dtype(
+    [
+        ("error_m", "f8"),  # distance between the estimate and the target after the correction
+        ("energy_mj", "f8"),
+        ("energy_j", "f8", len(PURPOSES)),  # by purpose
+        ("members", "i8"),  # awake nodes, head included; all that woke in a search
+        ("detections", "i8"),  # awake nodes that detected
+        ("delivered", "i8"),  # reports the head had, its own included
+        ("dropped", "i8"),  # chosen nodes that were dead or named twice or out of range
+        ("handover", "?"),  # the head's role went to another node
+        ("searched", "?"),
+        ("resampled", "?"),
+        ("n_eff", "f8"),
+        ("posterior_rms_m", "f8"),  # sqrt(trace of the belief's position covariance)
+        ("alive", "i8"),  # living nodes after the period
+        ("target_m", "f8", 2),  # the truth
+        ("estimate_m", "f8", 2),
+    ],
+    align=True,
+)
+
+
+class Outcome(NamedTuple):
+    """What a period brought and cost; for rewards and loggers, never for policies."""
+
+    row: np.ndarray  # (B,) OUTCOME
+    spent_j: np.ndarray  # (B, S) by node: the ledger's of the state after the period, not a copy
+
+    __getattr__ = _of_row
 
 
 class Tracker(Protocol):

@@ -15,7 +15,7 @@ from wsn_env.interface import Interface, Settings
 from wsn_env.interface.info import measures
 from wsn_env.interface.render import check_render_mode, frame
 from wsn_env.scenario import Scenario
-from wsn_env.types import State
+from wsn_env.types import Outcome, State
 from wsn_env.view import View
 from wsn_env.world import World
 
@@ -55,8 +55,9 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self.metadata = type(self).metadata | {"autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
         self.scenario = Scenario.of(scenario, **overrides)
-        self.interface = Interface(self.scenario, Settings(action, observation, reward, order, candidates))
         self.world = World(self.scenario, threads)
+        settings = Settings(action, observation, reward, order, candidates)
+        self.interface = Interface(self.scenario, settings, self.world.threads)
         self.single_action_space = self.interface.action.space
         self.single_observation_space = self.interface.observation.space
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -86,8 +87,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         if self._state is None:
             self._state = self.world.reset(np.zeros(self.num_envs, np.uint64))
         outcome = self._restart(rows)
-        info = self._measures(outcome)
-        return self._observe(), _masked(info, rows)
+        return self._observe(), _masked(self._reward_and_info(outcome)[1], rows)
 
     def _rows_to_reset(self, options) -> np.ndarray:
         mask = (options or {}).get("reset_mask")
@@ -121,13 +121,12 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             )
         cluster = self.interface.action.cluster(self._checked(actions), self._view)
         self._state, outcome = self.world.step(self._state, cluster, donate=True)
-        reward = self.interface.reward(outcome, self._state.lam)
-        info = measures(outcome, self._state, reward)
+        reward, info = self._reward_and_info(outcome)
         self._squares += outcome.error_m * outcome.error_m
         if anew.any():  # next-step mode: these rows only begin
             reward[anew] = 0.0
             first = self._restart(anew)
-            _overwrite(info, self._measures(first), anew)
+            _overwrite(info, self._reward_and_info(first)[1], anew)
         truncated = self._state.period >= self.scenario.periods
         terminated = np.zeros(self.num_envs, dtype=bool)
         ends = {"episode_rms_m": np.sqrt(self._squares / self.scenario.periods)}
@@ -148,7 +147,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         infos = {"final_obs": final, "_final_obs": truncated.copy()}
         infos |= {"final_info": _masked(info | ends, truncated), "_final_info": truncated.copy()}
         first = self._restart(truncated)
-        _overwrite(info, self._measures(first), truncated)
+        _overwrite(info, self._reward_and_info(first)[1], truncated)
         infos |= _masked(info, np.ones(self.num_envs, dtype=bool))
         return self._observe(), reward, terminated, truncated, infos
 
@@ -170,8 +169,9 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             return None
         return tuple(frame(self._state, self.scenario, row) for row in range(self.num_envs))
 
-    def _measures(self, outcome):
-        return measures(outcome, self._state, self.interface.reward(outcome, self._state.lam))
+    def _reward_and_info(self, outcome: Outcome) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        reward = self.interface.reward(outcome.row, self._state.lam)
+        return reward, measures(outcome.row, self._state.lam, reward)
 
     def _checked(self, actions):
         if isinstance(actions, (list, tuple)) and isinstance(actions[0], dict):  # as policies' predict() gives them

@@ -12,41 +12,36 @@ from functools import cached_property
 import numpy as np
 
 from wsn_env.physics import field as geometry
-from wsn_env.types import Cluster, Network, Reports, State
+from wsn_env.types import BELIEF, NETWORK, STATE, Cluster, Grid, Network, Reports, State
+
+
+def _field(array: str, name: str, meaning: str):
+    return property(lambda view: getattr(view, array)[name], doc=meaning)
 
 
 @dataclass(frozen=True, eq=False)
 class View:
     """The network's knowledge before it chooses the cluster of the next period; all arrays lead with B."""
 
-    period: np.ndarray  # (B,) periods done
-    lam: np.ndarray  # (B,) m/mJ
-    luck: np.ndarray  # (B,) uint32: a random number of the period
-    log_miss: np.ndarray  # (B,) log probability of so long a silence
-    mean: np.ndarray  # (B, 4) x, vx, y, vy after the last correction
-    cov: np.ndarray  # (B, 4, 4)
-    predicted_mean: np.ndarray  # (B, 4) for the period to come
-    predicted_cov: np.ndarray  # (B, 4, 4)
+    row: np.ndarray  # (B,) STATE
+    belief: np.ndarray  # (B,) BELIEF
     network: Network
     reports: Reports
     _nearest: dict = field(default_factory=dict, repr=False)
 
+    period = _field("row", "period", "(B,) periods done.")
+    lam = _field("row", "lam", "(B,) m/mJ.")
+    luck = _field("row", "luck", "(B,) uint32: a random number of the period.")
+    log_miss = _field("row", "log_miss", "(B,) log probability of so long a silence.")
+    mean = _field("belief", "mean", "(B, 4) x, vx, y, vy after the last correction.")
+    cov = _field("belief", "cov", "(B, 4, 4).")
+    predicted_mean = _field("belief", "predicted_mean", "(B, 4) for the period to come.")
+    predicted_cov = _field("belief", "predicted_cov", "(B, 4, 4).")
+
     @classmethod
     def of(cls, state: State) -> View:
         """The view of a state."""
-        belief = state.belief
-        return cls(
-            period=state.period,
-            lam=state.lam,
-            luck=state.luck,
-            log_miss=state.log_miss,
-            mean=belief.mean,
-            cov=belief.cov,
-            predicted_mean=belief.predicted_mean,
-            predicted_cov=belief.predicted_cov,
-            network=state.network,
-            reports=state.reports,
-        )
+        return cls(state.row, state.belief.row, state.network, state.reports)
 
     @property
     def positions(self) -> np.ndarray:
@@ -61,7 +56,7 @@ class View:
     @property
     def head(self) -> np.ndarray:
         """(B,) the standing head; -1: none."""
-        return self.network.head
+        return self.network.row["head"]
 
     @property
     def rows(self) -> np.ndarray:
@@ -112,8 +107,12 @@ class View:
     def nearest(self, count: int) -> tuple[np.ndarray, np.ndarray]:
         """The living nodes nearest to the prediction: (B, count) nodes, -1 for none, and distances [m]."""
         if count not in self._nearest:
-            self._nearest[count] = geometry.nearest(self.positions, self.battery, self.prediction, count)
+            self._nearest[count] = geometry.nearest(self.network, self.prediction, count)
         return self._nearest[count]
+
+    def remember_nearest(self, nodes: np.ndarray, distances: np.ndarray) -> None:
+        """What a kernel has found in passing."""
+        self._nearest[nodes.shape[1]] = nodes, distances
 
     def nearest_living(self) -> np.ndarray:
         """(B,) the living node nearest to the prediction; -1: none is alive."""
@@ -144,26 +143,25 @@ class View:
         a = {name: np.asarray(value) for name, value in arrays.items()}
         if a["battery"].ndim == 1:
             a = {name: value[None] for name, value in a.items()}
-        rows = len(a["battery"])
-        heads = a["head"].reshape(rows).astype(np.int64)
+        rows, nodes = a["battery"].shape
         others = a["member"].astype(bool)
-        standing = np.flatnonzero(heads >= 0)
-        others[standing, heads[standing]] = False
-        members, n_members = _lists(others)
+        row, belief, network_row = np.zeros(rows, STATE), np.zeros(rows, BELIEF), np.zeros(rows, NETWORK)
+        for name in ("period", "lam", "luck", "log_miss"):
+            row[name] = a[name].reshape(rows)
+        for name in ("mean", "cov", "predicted_mean", "predicted_cov"):
+            belief[name] = a[name]
+        network_row["alive"] = (a["battery"] > 0).sum(axis=1)
+        network_row["head"] = a["head"].reshape(rows)
+        standing = np.flatnonzero(network_row["head"] >= 0)
+        others[standing, network_row["head"][standing]] = False
+        members, network_row["n_members"] = _lists(others)
         node, count = _lists(a["detected"].astype(bool))
         value = np.take_along_axis(a["measured"], np.maximum(node, 0)[:, :, None].astype(np.int64), axis=1)
-        return cls(
-            period=a["period"].reshape(rows),
-            lam=a["lam"].reshape(rows),
-            luck=a["luck"].reshape(rows).astype(np.uint32),
-            log_miss=a["log_miss"].reshape(rows),
-            mean=a["mean"],
-            cov=a["cov"],
-            predicted_mean=a["predicted_mean"],
-            predicted_cov=a["predicted_cov"],
-            network=Network(a["positions"], a["battery"], (a["battery"] > 0).sum(axis=1), heads, members, n_members),
-            reports=Reports(count, node, value),
-        )
+        grid = Grid.zeros(rows, nodes)
+        positions = np.ascontiguousarray(a["positions"], np.float64)
+        geometry.index(positions, grid)
+        network = Network(network_row, positions, a["battery"], members, grid)
+        return cls(row, belief, network, Reports(count, node, value))
 
 
 def _mask(nodes: np.ndarray, count: np.ndarray) -> np.ndarray:

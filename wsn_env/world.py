@@ -10,7 +10,10 @@ from wsn_env.physics.constants import constants
 from wsn_env.physics.motion import motion_parameters
 from wsn_env.scenario import Scenario
 from wsn_env.trackers import make_tracker
-from wsn_env.types import Cluster, Outcome, State
+from wsn_env.trackers.particle import ParticleTracker
+from wsn_env.types import OUTCOME, Cluster, Outcome, State
+
+LONG_LIST = 64
 
 
 class World:
@@ -42,7 +45,7 @@ class World:
         return self.restart(state, np.ones(len(keys), bool), keys, donate=True)[0]
 
     def restart(self, state: State, rows, keys, donate: bool = False) -> tuple[State, Outcome]:
-        """New episodes in some rows of a batch; the others stay.
+        """New episodes in some rows of a batch; the others stay, but for the ledger of their last period.
 
         Args:
             state: the batch.
@@ -56,9 +59,9 @@ class World:
         if not rows.shape == keys.shape == (state.rows,):
             raise ValueError(f"rows {rows.shape} and keys {keys.shape}: must both be ({state.rows},)")
         state = state if donate else state.copy()
-        outcome = Outcome.zeros(state.rows, self.scenario.field.nodes)
+        outcome = _nothing_yet(state)
         self._over_rows(episode.begin, rows, keys, *self._beginning, state)
-        self.tracker.start(state.key, state.period, rows, state.belief)
+        self.tracker.start(state.key, state.period.copy(), rows, state.belief)
         if self.scenario.tracking.start == "search":
             self._search(rows, state, outcome)
         self._over_rows(period.settle, rows, state, outcome)
@@ -76,17 +79,20 @@ class World:
         Returns: the state after the period, and what it brought and cost.
         """
         state = state if donate else state.copy()
-        outcome = Outcome.zeros(state.rows, self.scenario.field.nodes)
+        outcome = _nothing_yet(state)
         heads, members = _choice(cluster, state)
-        resampled, lost = np.zeros(state.rows, bool), np.empty(state.rows, bool)
-
-        # Handover and invitations, the target moves, members sense and report.
-        self._over_rows(period.sense_and_report, heads, members, state, outcome)
-        # The head predicts and corrects.
-        self.tracker.correct(state.key, state.period, state.belief, state.network, state.reports, resampled)
-        # Broadcast, costs, and the prediction for the next period; first a search where the track is probably lost.
-        self._over_rows(period.conclude, resampled, lost, state, outcome)
-        if lost.any():
+        lost = np.zeros(state.rows, bool)
+        if isinstance(self.tracker, ParticleTracker):
+            n_lost = self._over_rows(period.run, heads, members, lost, state, outcome)
+        else:
+            # Handover and invitations, the target moves, members sense and report.
+            self._over_rows(period.sense_and_report, heads, members, state, outcome)
+            # The head predicts and corrects.
+            resampled = np.zeros(state.rows, bool)
+            self.tracker.correct(state.key, state.period.copy(), state.belief, state.network, state.reports, resampled)
+            # Broadcast, costs, and the prediction for the next period; first a search where the track is probably lost.
+            n_lost = self._over_rows(period.conclude, resampled, lost, state, outcome)
+        if n_lost:
             self._search(lost, state, outcome)
             self._over_rows(period.settle, lost, state, outcome)
         return state, outcome
@@ -94,14 +100,18 @@ class World:
     def _search(self, rows, state: State, outcome: Outcome) -> None:
         found = np.zeros(state.rows, bool)
         self._over_rows(period.search, rows, found, state, outcome)
-        self.tracker.relocate(state.key, state.period, found, state.belief)
+        self.tracker.relocate(state.key, state.period.copy(), found, state.belief)
 
-    def _over_rows(self, kernel, *arguments) -> None:
-        over_rows(kernel, len(arguments[0]), self.threads, self._constants, *arguments)  # all lead with B
+    def _over_rows(self, kernel, *arguments) -> int:
+        return over_rows(kernel, len(arguments[0]), self.threads, self._constants, *arguments)  # all lead with B
+
+
+def _nothing_yet(state: State) -> Outcome:
+    return Outcome(np.zeros(state.rows, OUTCOME), state.ledger.spent_j)
 
 
 def _choice(cluster: Cluster, state: State) -> tuple[np.ndarray, np.ndarray]:
-    """Heads (B,) and members (B, M) as kernels take them; the members are a copy."""
+    """Heads (B,) and members (B, M) as kernels take them."""
     heads, members = np.ascontiguousarray(cluster.head, np.int64), np.asarray(cluster.members)
     if heads.shape != (state.rows,) or members.ndim != 2 or len(members) != state.rows:
         raise ValueError(
@@ -110,4 +120,6 @@ def _choice(cluster: Cluster, state: State) -> tuple[np.ndarray, np.ndarray]:
     if members.dtype != np.int32:  # numbers that 32 bits would wrap are no nodes
         nodes = state.network.battery.shape[1]
         members = np.where((members < -1) | (members > nodes), nodes, members)
-    return heads, np.array(members, np.int32, order="C")
+    if members.shape[1] > LONG_LIST:  # kernels sort short lists
+        members = np.sort(members, axis=1)
+    return heads, np.ascontiguousarray(members, np.int32)

@@ -22,7 +22,7 @@ class Settings:
 class Interface:
     """The three translations of an environment, bound to a scenario."""
 
-    def __init__(self, scenario: Scenario, settings: Settings):
+    def __init__(self, scenario: Scenario, settings: Settings, threads: int = 1):
         self.action = make_action(settings.action, scenario, settings.order, settings.candidates)
-        self.observation = make_observation(settings.observation, scenario, settings.candidates)
+        self.observation = make_observation(settings.observation, scenario, settings.candidates, threads)
         self.reward = make_reward(settings.reward)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from gymnasium import spaces
 
-from wsn_env.compiling import lean_kernel
+from wsn_env.compiling import lean_kernel, lean_piece
 from wsn_env.interface.merit import ORDERS, order_by_information
 from wsn_env.physics.constants import constants
 from wsn_env.quantity import suggest
 from wsn_env.scenario import Scenario
-from wsn_env.types import Cluster
+from wsn_env.types import KEEP_CLUSTER, Cluster
 from wsn_env.view import View
 
 MENU_MEMBERS = 8  # the menu's largest number of further members
@@ -30,23 +30,18 @@ class MenuAction:
     def cluster(self, action, view: View) -> Cluster:
         """The cluster that the menu's entries name."""
         actions = np.ascontiguousarray(action, dtype=np.int64).reshape(-1)
-        moves = (actions > MENU_MEMBERS + 1) | (view.head < 0)
-        nodes = self._ordered(moves, view)
-        network = view.network
-        width = MENU_MEMBERS + 1 if actions.all() else max(MENU_MEMBERS + 1, network.n_members.max())
-        heads, members = np.empty(len(actions), np.int64), np.full((len(actions), width), -1, np.int32)
-        standing = (network.head, network.members, network.n_members)
-        _read_menu(0, len(actions), actions, moves, nodes, standing, heads, members)
+        nodes = self._ordered(actions, view)
+        heads, members = np.empty(len(actions), np.int64), np.empty((len(actions), MENU_MEMBERS + 1), np.int32)
+        _read_menu(0, len(actions), actions, nodes, view.network.row, heads, members)
         return Cluster(heads, members)
 
-    def _ordered(self, moves, view: View) -> np.ndarray:
+    def _ordered(self, actions, view: View) -> np.ndarray:
         """(B, K) candidates in order of merit, -1 at the end."""
         nodes = view.nearest(self._candidates)[0]
         if self._order == "nearest":
             return nodes
-        ordered, kept = np.empty_like(nodes), np.where(moves, -1, view.head)
-        mean, cov = view.predicted_mean, view.predicted_cov
-        order_by_information(0, len(nodes), self._constants, view.positions, kept, mean, cov, nodes, ordered)
+        ordered, kept = np.empty_like(nodes), np.where(_moves.py_func(actions, view.head), -1, view.head)
+        order_by_information(0, len(nodes), self._constants, view.positions, kept, view.belief, nodes, ordered)
         return ordered
 
     def masks(self, view: View) -> np.ndarray:
@@ -60,22 +55,27 @@ class MenuAction:
         return valid
 
 
+@lean_piece
+def _moves(action, head):
+    """Whether an entry gives the head's role to the best node."""
+    return (action > MENU_MEMBERS + 1) | (head < 0)
+
+
 @lean_kernel
-def _read_menu(start, stop, actions, moves, nodes, standing, heads, members):
+def _read_menu(start, stop, actions, nodes, standing, heads, members):
     """Fill heads (B,) and members (B, M) from the menu's entries and the candidates in order of merit."""
-    standing_head, standing_members, n_members = standing
     for b in range(start, stop):
-        head = standing_head[b]
-        if actions[b] == 0 and head >= 0:  # the cluster as it is
-            heads[b] = head
-            for k in range(n_members[b]):
-                members[b, k] = standing_members[b, k]
+        head = standing[b].head
+        members[b] = -1
+        if actions[b] == 0 and head >= 0:
+            heads[b] = KEEP_CLUSTER
             continue
         left = (actions[b] - 1) % (MENU_MEMBERS + 1) if actions[b] > 0 else 0
-        if moves[b]:  # the best leads
+        heads[b] = head
+        if _moves(actions[b], head):  # the best leads
+            heads[b] = nodes[b, 0]
             head = -1
             left += 1
-        heads[b] = nodes[b, 0] if moves[b] else head
         slot = 0
         for node in nodes[b]:
             if left > 0 and node >= 0 and node != head:

@@ -1,31 +1,33 @@
 """What an environment tells loggers of a period."""
 
-import numpy as np
+from collections.abc import Mapping
+from typing import Any
 
-from wsn_env.types import Outcome, State
+TOLD = (
+    "error_m",
+    "energy_mj",
+    "members",
+    "delivered",
+    "dropped",
+    "handover",
+    "searched",
+    "n_eff",
+    "posterior_rms_m",
+    "alive",
+    "target_m",
+    "estimate_m",
+)
 
 
-def measures(outcome: Outcome, state: State, reward: np.ndarray) -> dict[str, np.ndarray]:
-    """The info of a period, (B, ...) each. It carries truth: for loggers only, never for policies.
+def measures(outcome: Mapping[str, Any], lam, reward) -> dict[str, Any]:
+    """The info of a period. It carries truth: for loggers only, never for policies.
 
     Args:
-        reward: (B,) of the period; its two parts are told apart here.
+        outcome: the fields of OUTCOME by name, arrays (B, ...) or the numbers of one row.
+        lam: (B,) or a number.
+        reward: of the period; its two parts are told apart here.
     """
-    energy_mj = outcome.energy_mj
-    cost = state.lam * energy_mj
-    return {
-        "error_m": outcome.error_m,
-        "energy_mj": energy_mj,
-        "reward_error": reward + cost,
-        "reward_energy": -cost,
-        "members": outcome.members,
-        "delivered": outcome.delivered,
-        "dropped": outcome.dropped,
-        "handover": outcome.handover.astype(bool),
-        "searched": outcome.searched.astype(bool),
-        "n_eff": state.belief.n_eff.copy(),
-        "posterior_rms_m": outcome.posterior_rms_m,
-        "alive": outcome.alive,
-        "target_m": outcome.target_m,
-        "estimate_m": outcome.estimate_m,
-    }
+    info = {name: outcome[name] for name in TOLD}
+    info["reward_energy"] = -lam * outcome["energy_mj"]
+    info["reward_error"] = reward - info["reward_energy"]
+    return info

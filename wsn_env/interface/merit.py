@@ -50,7 +50,7 @@ def gain(positions, node, mean, cov, p00, p01, p11, c):
 
 
 @kernel
-def order_by_information(start, stop, cs, positions, heads, means, covs, nodes, ordered):
+def order_by_information(start, stop, cs, positions, heads, beliefs, nodes, ordered):
     """Greedy order of the candidates: each next one is the best after those before it.
 
     Args:
@@ -62,7 +62,7 @@ def order_by_information(start, stop, cs, positions, heads, means, covs, nodes, 
     size = nodes.shape[1]
     used = np.empty(size, np.bool_)
     for b in range(start, stop):
-        mean, cov = means[b], covs[b]
+        mean, cov = beliefs[b].predicted_mean, beliefs[b].predicted_cov
         p00, p01, p11 = cov[0, 0], cov[0, 2], cov[2, 2]
         if heads[b] >= 0:
             _, p00, p01, p11 = gain(positions[b], heads[b], mean, cov, p00, p01, p11, c)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from gymnasium import spaces
 
-from wsn_env.compiling import lean_kernel, lean_piece
+from wsn_env.compiling import lean_kernel, lean_piece, over_rows
 from wsn_env.interface.merit import gain, mean_detection
 from wsn_env.numerics import log
 from wsn_env.physics.constants import constants
-from wsn_env.physics.field import squared_distance
+from wsn_env.physics.field import nearest_candidates, squared_distance
 from wsn_env.physics.sensing import detection_piece
 from wsn_env.quantity import suggest
 from wsn_env.scenario import Scenario
@@ -51,23 +51,23 @@ BOUND = 10.0
 
 
 @lean_kernel
-def _encode(start, stop, cs, battery_j, view, nodes, distances, out):
-    """Fill out (B, n): BELIEF_FEATURES, then CANDIDATE_FEATURES of each candidate."""
+def _encode(start, stop, cs, battery_j, rows, beliefs, network, reports, nodes, distances, out):
+    """Fill out (B, n): BELIEF_FEATURES, then CANDIDATE_FEATURES of each candidate; and the candidates (B, K)."""
     c = cs[0]
     size, width = len(BELIEF_FEATURES), len(CANDIDATE_FEATURES)
-    lam, log_miss, mean, cov, network, reports = view
     for b in range(start, stop):
-        positions, m, p, head = network.positions[b], mean[b], cov[b], network.head[b]
-        members, n = network.members[b], network.n_members[b]
+        m, p, head = beliefs[b].predicted_mean, beliefs[b].predicted_cov, network.row[b].head
+        nearest_candidates(network, b, m[0], m[2], nodes[b], distances[b])
+        positions, members, n = network.positions[b], network.members[b], network.row[b].n_members
         f = out[b]
         f[:] = 0.0
-        f[0] = 0.5 * log(max(lam[b], 1e-3))
+        f[0] = 0.5 * log(max(rows[b].lam, 1e-3))
         ex, ey = _encode_ellipse(m, p, c, f)
-        f[9] = 0.2 * log_miss[b]
+        f[9] = 0.2 * rows[b].log_miss
         f[10] = 0.25 * reports.count[b]
         if head >= 0:
             _encode_head(head, head == nodes[b, 0], members, n, positions, m, p, ex, ey, c, f)
-        f[18] = distances[b, len(distances[b]) - 1] / c.radius_m
+        f[18] = distances[b, -1] / c.radius_m
         for k in range(nodes.shape[1]):
             node, g = nodes[b, k], f[size + k * width : size + (k + 1) * width]
             if node < 0:
@@ -139,28 +139,30 @@ def _encode_candidate(node, head, members, n, positions, m, p, ex, ey, c, g):
 class CandidatesObservation:
     """Flat Box float32: BELIEF_FEATURES, then CANDIDATE_FEATURES of the K living nodes nearest to the prediction."""
 
-    def __init__(self, scenario: Scenario, candidates: int):
+    def __init__(self, scenario: Scenario, candidates: int, threads: int = 1):
         self.size = len(BELIEF_FEATURES)
         self.shape = (candidates, len(CANDIDATE_FEATURES))
         self.space = spaces.Box(-BOUND, BOUND, (self.size + candidates * self.shape[1],), np.float32)
+        self._threads = threads
         self._constants = constants(scenario)
         self._battery_j = scenario.radio.battery_j
 
     def encode(self, view: View) -> np.ndarray:
         """(B, n) float32, fresh."""
-        rows = len(view.period)
-        nodes, distances = view.nearest(self.shape[0])
-        out = np.empty((rows, self.space.shape[0]), np.float32)
-        seen = (view.lam, view.log_miss, view.predicted_mean, view.predicted_cov, view.network, view.reports)
-        _encode(0, rows, self._constants, self._battery_j, seen, nodes, distances, out)
+        rows, candidates = len(view.row), self.shape[0]
+        nodes, distances = np.empty((rows, candidates), np.int64), np.empty((rows, candidates))
+        out = np.empty((rows, *self.space.shape), np.float32)
+        seen = (view.row, view.belief, view.network, view.reports)
+        over_rows(_encode, rows, self._threads, self._constants, self._battery_j, *seen, nodes, distances, out)
+        view.remember_nearest(nodes, distances)
         return out
 
 
 class DictObservation:
     """The same features under names: belief (19,), candidates (K, 9), and lam (1,) [m/mJ]."""
 
-    def __init__(self, scenario: Scenario, candidates: int):
-        self._flat = CandidatesObservation(scenario, candidates)
+    def __init__(self, scenario: Scenario, candidates: int, threads: int = 1):
+        self._flat = CandidatesObservation(scenario, candidates, threads)
         high = max(scenario.lam_range[1], 1.0)
         self.space = spaces.Dict(
             {
@@ -183,7 +185,7 @@ class DictObservation:
 class ViewObservation:
     """Everything a network could know, as float64: enough for every hand-written policy (`View.from_arrays`)."""
 
-    def __init__(self, scenario: Scenario, candidates: int):
+    def __init__(self, scenario: Scenario, candidates: int, threads: int = 1):
         nodes, side, far = scenario.field.nodes, scenario.field.side_m, 1e9
 
         def box(low, high, *shape):
@@ -216,7 +218,7 @@ class ViewObservation:
 OBSERVATIONS = {"candidates": CandidatesObservation, "dict": DictObservation, "view": ViewObservation}
 
 
-def make_observation(name: str, scenario: Scenario, candidates: int):
+def make_observation(name: str, scenario: Scenario, candidates: int, threads: int = 1):
     """An observation by name.
 
     Raises:
@@ -224,4 +226,4 @@ def make_observation(name: str, scenario: Scenario, candidates: int):
     """
     if name not in OBSERVATIONS:
         raise ValueError(f"observation {name!r} is unknown: {suggest(name, OBSERVATIONS)}")
-    return OBSERVATIONS[name](scenario, candidates)
+    return OBSERVATIONS[name](scenario, candidates, threads)

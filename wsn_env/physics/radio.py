@@ -1,26 +1,39 @@
 """What talking costs: sender and receiver pay for every try, a node gives no more than it has.
 
-Reports may be lost and are tried again (assumption d of Xiang & Guo, 2013); control packets always arrive.
+Reports may be lost and are tried again (assumption d of Xiang & Guo, 2013); control packets always arrive. All pieces
+work on row b of the state and of the period's outcome.
 """
 
-import numpy as np
-
 from wsn_env import draws
-from wsn_env.compiling import lean_piece, piece
+from wsn_env.compiling import lean_piece
 from wsn_env.physics.field import squared_distance
 
 SENSING, HANDOVER, INVITATION, REPORT, BROADCAST, SEARCH = range(6)
 
 
 @lean_piece
-def spend(node, joules, purpose, battery, spent, energy):
+def spend(node, joules, purpose, state, outcome, b):
     """Charge a node; what it cannot pay empties it. Returns whether it could pay in full."""
+    battery, ledger = state.network.battery[b], state.ledger
     before = battery[node]
     battery[node] = max(before - joules, 0.0)
     paid = before - battery[node]
-    spent[node] += paid
-    energy[purpose] += paid
+    if paid > 0.0:
+        if ledger.spent_j[b, node] == 0.0:
+            ledger.payer[b, ledger.count[b]] = node
+            ledger.count[b] += 1
+        ledger.spent_j[b, node] += paid
+        outcome.row[b].energy_j[purpose] += paid
+        state.network.row[b].alive -= battery[node] == 0.0
     return before >= joules
+
+
+@lean_piece
+def close_books(ledger, b):
+    """Forget the last period's payments."""
+    for k in range(ledger.count[b]):
+        ledger.spent_j[b, ledger.payer[b, k]] = 0.0
+    ledger.count[b] = 0
 
 
 @lean_piece
@@ -30,22 +43,24 @@ def transmission(bits, squared, c):
 
 
 @lean_piece
-def send(sender, receiver, bits, purpose, positions, battery, spent, energy, c):
+def send(sender, receiver, bits, purpose, state, outcome, b, c):
     """One packet from node to node (eq. 5). Returns whether both could pay, so that it arrived if not lost."""
+    positions, battery = state.network.positions[b], state.network.battery[b]
     squared = squared_distance(positions, sender, positions[receiver, 0], positions[receiver, 1])
-    if battery[sender] <= 0.0 or not spend(sender, transmission(bits, squared, c), purpose, battery, spent, energy):
+    if battery[sender] <= 0.0 or not spend(sender, transmission(bits, squared, c), purpose, state, outcome, b):
         return False
-    return battery[receiver] > 0.0 and spend(receiver, bits * c.rx_j_per_bit, purpose, battery, spent, energy)
+    return battery[receiver] > 0.0 and spend(receiver, bits * c.rx_j_per_bit, purpose, state, outcome, b)
 
 
 @lean_piece
-def report(key, period, node, head, purpose, positions, battery, spent, energy, c):
+def report(node, head, purpose, state, outcome, b, c):
     """A member's report with its retries. Returns whether the head has it; the head's own is free."""
     if node == head:
         return True
-    stream = draws.stream(key, period, draws.SEARCH_PACKET if purpose == SEARCH else draws.PACKET)
+    packet = draws.SEARCH_PACKET if purpose == SEARCH else draws.PACKET
+    stream = draws.stream(state.key[b], state.row[b].period, packet)
     for attempt in range(c.tries):
-        if not send(node, head, c.report_bits, purpose, positions, battery, spent, energy, c):
+        if not send(node, head, c.report_bits, purpose, state, outcome, b, c):
             return False
         if draws.uniform(stream, 16 * node + attempt) < c.packet_success:
             return True
@@ -53,8 +68,11 @@ def report(key, period, node, head, purpose, positions, battery, spent, energy, 
 
 
 @lean_piece
-def broadcast(head, nodes, count, positions, battery, spent, energy, c):
+def broadcast(state, outcome, b, c):
     """The head's word to resample: one transmission as far as the farthest living member, who all pay to hear it."""
+    network = state.network
+    head, nodes, count = network.row[b].head, network.members[b], network.row[b].n_members
+    positions, battery = network.positions[b], network.battery[b]
     farthest = -1.0
     for k in range(count):
         if battery[nodes[k]] > 0.0:
@@ -62,65 +80,39 @@ def broadcast(head, nodes, count, positions, battery, spent, energy, c):
             farthest = max(farthest, squared)
     if farthest < 0.0 or battery[head] <= 0.0:
         return
-    if spend(head, transmission(c.broadcast_bits, farthest, c), BROADCAST, battery, spent, energy):
+    if spend(head, transmission(c.broadcast_bits, farthest, c), BROADCAST, state, outcome, b):
         for k in range(count):
             if battery[nodes[k]] > 0.0:
-                spend(nodes[k], c.broadcast_bits * c.rx_j_per_bit, BROADCAST, battery, spent, energy)
-
-
-@piece
-def standing_members(members, battery):
-    """The chosen members in ascending order, each once and alive: moved to the front of `members`; their number.
-
-    Entries of -1 are empty. Anything else that falls away is counted as dropped by the caller.
-    """
-    ordered = True
-    last = np.int32(-1)
-    for k in range(len(members)):
-        if 0 <= members[k] <= last:
-            ordered = False
-            break
-        last = max(last, members[k])
-    if not ordered:
-        members[:] = np.sort(members)
-    count = 0
-    last = np.int32(-1)
-    for k in range(len(members)):
-        node = members[k]
-        if last < node < len(battery) and battery[node] > 0.0:
-            members[count] = node
-            count += 1
-            last = node
-    return count
+                spend(nodes[k], c.broadcast_bits * c.rx_j_per_bit, BROADCAST, state, outcome, b)
 
 
 @lean_piece
-def form(head, chosen, count, network, b, spent, energy, c):
+def form(head, chosen, count, state, outcome, b, c):
     """Make the chosen cluster the standing one: handover from the old head, invitations to new members.
 
     Only members that hear their invitation join.
 
     Args:
         head: the new head, alive.
-        chosen: (M,) its first `count` entries are living members in ascending order, the head left out. Overwritten.
+        chosen: its first `count` entries are living members in ascending order, the head left out. Overwritten.
 
     Returns: whether the head's role was handed over.
     """
-    positions, battery = network.positions[b], network.battery[b]
-    old, members = network.head[b], network.members[b]
+    standing, members = state.network.row[b], state.network.members[b]
+    old, old_count = standing.head, standing.n_members
     changed = old != head
-    handed = changed and old >= 0 and send(old, head, c.handover_bits, HANDOVER, positions, battery, spent, energy, c)
+    handed = changed and old >= 0 and send(old, head, c.handover_bits, HANDOVER, state, outcome, b, c)
     n, j = 0, 0
     for k in range(count):
         node = chosen[k]
-        while j < network.n_members[b] and members[j] < node:
+        while j < old_count and members[j] < node:
             j += 1
-        stands = not changed and j < network.n_members[b] and members[j] == node
-        if stands or send(head, node, c.invitation_bits, INVITATION, positions, battery, spent, energy, c):
+        stands = not changed and j < old_count and members[j] == node
+        if stands or send(head, node, c.invitation_bits, INVITATION, state, outcome, b, c):
             chosen[n] = node  # n <= k: what is overwritten has been read
             n += 1
     for k in range(n):
         members[k] = chosen[k]
-    network.head[b] = head
-    network.n_members[b] = n
+    standing.head = head
+    standing.n_members = n
     return handed

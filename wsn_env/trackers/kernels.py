@@ -206,7 +206,7 @@ def spread_rows(start, stop, keys, periods, rows, belief):
     for b in range(start, stop):
         if rows[b]:
             stream = draws.stream(keys[b], periods[b], draws.CLOUD)
-            spread(stream, belief.mean[b], belief.cov[b], belief.particles[b], belief.log_weights[b])
+            spread(stream, belief.row[b].mean, belief.row[b].cov, belief.particles[b], belief.log_weights[b])
 
 
 @kernel
@@ -215,30 +215,45 @@ def relocate_rows(start, stop, keys, periods, rows, belief):
     for b in range(start, stop):
         if rows[b]:
             stream = draws.stream(keys[b], periods[b], draws.RESTART)
-            relocate(stream, belief.mean[b], belief.cov[b], belief.particles[b])
+            relocate(stream, belief.row[b].mean, belief.row[b].cov, belief.particles[b])
+
+
+@piece
+def filter_row(key, period, belief, network, reports, b, c, weights, ancestors):
+    """One period of row b: `period` counts from 1; the belief is that after the period before.
+
+    Args:
+        weights, ancestors: scratch for P particles.
+
+    Returns: whether the particles were resampled.
+    """
+    x, log_weights, row = belief.particles[b], belief.log_weights[b], belief.row[b]
+    n, count = x.shape[1], reports.count[b]
+    predict(draws.stream(key, period, draws.PROCESS), x, c.period_s, c.q)
+    for j in range(count):
+        position, value = network.positions[b, reports.node[b, j]], reports.value[b, j]
+        if c.pooled:
+            weigh(x, log_weights, j, count, position, value, c)
+        else:  # a constant stride of 1 lets the compiler use vectors
+            weigh(x, log_weights, 0, 1, position, value, c)
+    normalise(log_weights, weights)
+    row.n_eff, total = moments(x, weights, row.predicted_mean, row.mean, row.cov)
+    resampled = row.n_eff < c.resample_below * n
+    if resampled:
+        u = draws.uniform(draws.stream(key, period, draws.RESAMPLING), 0)
+        resample(u, x, log_weights, weights, total, ancestors)
+    return resampled
+
+
+@piece
+def scratch(particles):
+    """Room that `filter_row` needs: weights and ancestors."""
+    return np.empty(particles, np.float32), np.empty(particles + 1, np.int32)
 
 
 @kernel
-def filter_rows(start, stop, constants, keys, periods, belief, positions, reports, resampled):
-    """One period of the filter: `periods` count from 1; the beliefs are those after the period before."""
-    c = constants[0]
-    n = belief.particles.shape[2]
-    weights = np.empty(n, np.float32)
-    ancestors = np.empty(n + 1, np.int32)
+def filter_rows(start, stop, constants, keys, periods, belief, network, reports, resampled):
+    """One period of the filter alone."""
+    weights, ancestors = scratch(belief.particles.shape[2])
     for b in range(start, stop):
-        x, log_weights = belief.particles[b], belief.log_weights[b]
-        count = reports.count[b]
-        predict(draws.stream(keys[b], periods[b], draws.PROCESS), x, c.period_s, c.q)
-        for j in range(count):
-            node = reports.node[b, j]
-            if c.pooled:
-                weigh(x, log_weights, j, count, positions[b, node], reports.value[b, j], c)
-            else:  # a constant stride of 1 lets the compiler use vectors
-                weigh(x, log_weights, 0, 1, positions[b, node], reports.value[b, j], c)
-        normalise(log_weights, weights)
-        n_eff, total = moments(x, weights, belief.predicted_mean[b], belief.mean[b], belief.cov[b])
-        belief.n_eff[b] = n_eff
-        resampled[b] = n_eff < c.resample_below * n
-        if resampled[b]:
-            u = draws.uniform(draws.stream(keys[b], periods[b], draws.RESAMPLING), 0)
-            resample(u, x, log_weights, weights, total, ancestors)
+        resampled[b] = filter_row(keys[b], periods[b], belief, network, reports, b, constants[0], weights, ancestors)

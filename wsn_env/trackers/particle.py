@@ -38,7 +38,7 @@ class ParticleTracker:
             keys,
             periods,
             belief,
-            network.positions,
+            network,
             reports,
             resampled,
         )
