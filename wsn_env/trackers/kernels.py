@@ -8,14 +8,17 @@ import numpy as np
 from numba import int32, uint32
 
 from wsn_env import draws
-from wsn_env.compiling import kernel, piece
-from wsn_env.numerics import F, exp, exp32, f32_bits, f32_from_bits, log32
+from wsn_env.compiling import inline_piece, kernel, piece
+from wsn_env.draws import normal_pair32
+from wsn_env.numerics import F, exp, exp32, expm1_32, f32_bits, f32_from_bits, log, log32
 
 LANES = 16
 BLOCK = 8  # particles whose weights are summed apart when resampling
 REACH = 16  # slots of the running maximum's widest window
 SUMS = 16  # w, w^2, four of w d, ten of w d d'
 POSITION, STRENGTH, POWER = range(3)
+LOG_LEAST, LOG_MOST = F(-13.815510558), F(-1.0000005e-6)  # p in [1e-6, 1 - 1e-6]: no report rules a particle out
+TINY = F(1e-30)
 
 
 @piece
@@ -30,7 +33,7 @@ def spread(stream, mean, cov, x, log_weights):
         slope = cov[axis, axis + 1] / sd if sd > 0.0 else 0.0
         rest = np.sqrt(max(cov[axis + 1, axis + 1] - slope * slope, 0.0))
         for i in range(x.shape[1]):
-            e0, e1 = draws.normal_pair32(draws.bits(stream, axis * x.shape[1] + i))
+            e0, e1 = normal_pair32(draws.bits(stream, axis * x.shape[1] + i))
             x[axis, i] = F(mean[axis]) + F(sd) * e0
             x[axis + 1, i] = F(mean[axis + 1]) + F(slope) * e0 + F(rest) * e1
     log_weights[:] = F(0)
@@ -43,7 +46,7 @@ def predict(stream, x, period_s, q):
     t = F(period_s)
     h, g = F(0.5 * period_s * period_s * q), F(period_s * q)
     for i in range(x.shape[1]):
-        ax, ay = draws.normal_pair32(draws.bits(stream, i))
+        ax, ay = normal_pair32(draws.bits(stream, i))
         px[i] += t * vx[i] + h * ax
         vx[i] += g * ax
         py[i] += t * vy[i] + h * ay
@@ -80,6 +83,60 @@ def weigh(x, log_weights, first, step, position, value, c):
             dy = py[i] - sy
             r = z - top * exp32(-slope * (log32(max(dx * dx + dy * dy, floor)) - log_floor))
             log_weights[i] -= F(0.5) * (r * r)
+
+
+@piece
+def weigh_detection(x, log_weights, position, c):
+    """Add to every particle the log probability that the node at `position`, which reported, detects a target there."""
+    px, py = x[0], x[2]
+    sx, sy = F(position[0]), F(position[1])
+    curve = detection_curve(c)
+    for i in range(x.shape[1]):
+        dx = px[i] - sx
+        dy = py[i] - sy
+        log_weights[i] += log_detection32(dx * dx + dy * dy, curve)
+
+
+@piece
+def weigh_silence(x, log_weights, position, delivery, c):
+    """Add log(1 - delivery p(d)): the node at `position` was awake and nothing was heard of it.
+
+    Args:
+        delivery: probability that a report of the node arrives; 1 for the head.
+    """
+    px, py = x[0], x[2]
+    sx, sy = F(position[0]), F(position[1])
+    curve = detection_curve(c)
+    sent, lost = F(delivery), F(1.0 - delivery)
+    for i in range(x.shape[1]):
+        dx = px[i] - sx
+        dy = py[i] - sy
+        unseen = -expm1_32(log_detection32(dx * dx + dy * dy, curve))
+        log_weights[i] += log32(min(lost + sent * unseen, F(1)))  # <= 0, as log weights have to be
+
+
+@piece
+def detection_curve(c):
+    """Eqs. 2-3 in float32 and logarithms: inner and outer end [m], ln l1, b1, b2, ln l2."""
+    return (
+        F(c.inner_m),
+        F(c.reach_m),
+        F(log(max(c.decay, 1e-30))),
+        F(c.decay_power),
+        F(c.edge_power),
+        F(log(max(c.ceiling, 1e-30))),
+    )
+
+
+@inline_piece
+def log_detection32(squared, curve):
+    """Log of the detection probability at a squared distance [m^2] (eqs. 2-3), clipped to finite odds."""
+    inner, reach, log_decay, decay_power, edge_power, log_ceiling = curve
+    d = np.sqrt(squared)
+    a1, a2 = d - inner, reach - d
+    y = log_decay + decay_power * log32(max(a1, TINY)) - edge_power * log32(max(a2, TINY))
+    fall = exp32(min(y, F(3))) * F(a1 > F(0)) + F(20) * F(a2 <= F(0))  # beyond e**3 p is below the least anyway
+    return min(max(log_ceiling - fall, LOG_LEAST), LOG_MOST)
 
 
 @piece
@@ -234,7 +291,7 @@ def relocate(stream, mean, cov, x):
     """Draw the particles' positions anew ~ N(mean, cov); velocities and weights stay."""
     sx, sy = F(np.sqrt(cov[0, 0])), F(np.sqrt(cov[2, 2]))
     for i in range(x.shape[1]):
-        e0, e1 = draws.normal_pair32(draws.bits(stream, i))
+        e0, e1 = normal_pair32(draws.bits(stream, i))
         x[0, i] = F(mean[0]) + sx * e0
         x[2, i] = F(mean[2]) + sy * e1
 
