@@ -310,6 +310,27 @@ def test_detection_and_silence_weigh_like_plain_numpy(detection, mode):
     np.testing.assert_allclose(again, 2 * weights, rtol=1e-6)  # added, not set
 
 
+@numba.njit
+def awake(x, log_weights, positions, head, members, nodes, constants):
+    kernels.weigh_awake(x, log_weights, positions, head, members, nodes, constants[0])
+
+
+@pytest.mark.parametrize("nodes", [[], [0], [2, 3], [0, 1, 2, 3]])
+def test_every_awake_node_weighs_by_its_report_or_by_its_silence(nodes):
+    scenario = Scenario.named("PreDC-v0", radius_m=20.0, packet_success=0.7, retries=0)
+    x = np.random.default_rng(0).normal(50, 10, (4, 300)).astype(np.float32)
+    head, members = 2, np.array([0, 3], np.int32)  # node 1 sleeps
+    weights, exact = np.zeros(300, np.float32), np.zeros(300)
+    awake(x, weights, NODES, head, members, np.array(nodes, np.int32), constants(scenario))
+    for node in (head, *members):
+        p = np.clip(detection_probability(np.hypot(*(x[::2].T - NODES[node]).T), scenario.detection), 1e-6, 1 - 1e-6)
+        exact += np.log(p) if node in nodes else np.log1p(-p * (1 if node == head else scenario.radio.delivery))
+    np.testing.assert_allclose(weights, exact, atol=1e-4)
+    before = weights.copy()
+    awake(x, weights, NODES, -1, members, np.array(nodes, np.int32), constants(scenario))
+    np.testing.assert_array_equal(weights, before)
+
+
 # --- resampling -----------------------------------------------------------------------------------------------
 
 

@@ -86,6 +86,29 @@ def weigh(x, log_weights, first, step, position, value, c):
 
 
 @piece
+def weigh_awake(x, log_weights, positions, head, members, nodes, c):
+    """Add what it tells that of the awake nodes just these reported, whatever they measured.
+
+    Args:
+        positions: (S, 2) m.
+        head: its own report is always heard; -1: nobody is awake.
+        members: (n,) without the head; their reports arrive with probability `delivery`.
+        nodes: (m,) that reported.
+    """
+    if head < 0:
+        return
+    for k in range(-1, len(members)):
+        node = head if k < 0 else members[k]
+        reported = False
+        for other in nodes:
+            reported |= other == node
+        if reported:
+            weigh_detection(x, log_weights, positions[node], c)
+        else:
+            weigh_silence(x, log_weights, positions[node], 1.0 if k < 0 else c.delivery, c)
+
+
+@piece
 def weigh_detection(x, log_weights, position, c):
     """Add to every particle the log probability that the node at `position`, which reported, detects a target there."""
     px, py = x[0], x[2]
