@@ -4,7 +4,8 @@ import numba
 import numpy as np
 import pytest
 
-from wsn_env import numerics
+from wsn_env import draws, numerics
+from wsn_env.compiling import fast, piece
 
 N = 200_000
 
@@ -24,6 +25,14 @@ def over(piece):
 def ulps(got, exact):
     """Error in units of the last place of the exact value; `exact` in the longest precision there is."""
     return np.abs((got - exact) / np.spacing(np.abs(exact.astype(got.dtype)))).astype(float)
+
+
+MANTISSAS = np.arange(2**23, dtype=np.int32)
+
+
+def binade(exponent):
+    """Every float32 in [2**exponent, 2**(exponent + 1))."""
+    return (MANTISSAS + ((exponent + 127) << 23)).view(np.float32)
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +83,15 @@ def test_log32_has_a_relative_error_below_2e7(uniform):
     assert numerics.log32(np.float32(1)) == 0
 
 
+def test_log32_holds_for_every_mantissa():
+    log32 = over(numerics.log32)
+    for exponent in (-126, -1, 0, 127):
+        x = binade(exponent)
+        x = x[x != 1]
+        exact = np.log(x.astype(float))
+        assert np.abs(log32(x) / exact - 1).max() < 2e-7, exponent
+
+
 def test_exp32_has_a_relative_error_below_2e7_near_zero_and_never_vanishes(uniform):
     exp32 = over(numerics.exp32)
     near = uniform(-1, 0).astype(np.float32)
@@ -83,6 +101,61 @@ def test_exp32_has_a_relative_error_below_2e7_near_zero_and_never_vanishes(unifo
     below = np.array([-88, -1e4, -3e38, -np.inf], dtype=np.float32)
     assert (exp32(below) == np.float32(2.0**-126)).all()
     assert numerics.exp32(np.float32(0)) == 1
+
+
+def test_exp32_holds_over_its_whole_range():
+    """All float32 of some binades, and a grid with both neighbours of every point."""
+    exp32 = over(numerics.exp32)
+    grid = np.linspace(-87.3, 0, 2_000_000).astype(np.float32)
+    grid = np.concatenate([grid, np.nextafter(grid, np.float32(0)), np.nextafter(grid, np.float32(-99))])
+    for x in (-binade(-24), -binade(-1), -binade(0), -binade(5), grid):
+        x = x[(x > -87.3) & (x <= 0)]
+        exact = np.exp(x.astype(float))
+        limit = 2e-7 + 2.0**-24 * 1.5 * np.abs(x)  # x log2(e), below 1.5 |x|, is rounded once
+        assert (np.abs(exp32(x) / exact - 1) < limit).all()
+
+
+def test_expm1_32_loses_nothing_near_zero():
+    expm1_32 = over(numerics.expm1_32)
+    for x in (-binade(-100), -binade(-24), -binade(-2), -binade(-1), -binade(0), -binade(3)):
+        assert np.abs(expm1_32(x) / np.expm1(x.astype(float)) - 1).max() < 3e-7
+    assert numerics.expm1_32(np.float32(0)) == 0
+    assert numerics.expm1_32(np.float32(-1e30)) == -1
+
+
+def test_tanh32_holds_for_every_mantissa():
+    tanh32 = over(numerics.tanh32)
+    for exponent in (-126, -12, -2, -1, 0, 3):
+        x = binade(exponent)
+        exact = np.tanh(x.astype(float))
+        assert np.abs(tanh32(x) - exact).max() < 2e-7
+        assert np.abs(tanh32(-x) + exact).max() < 2e-7
+
+
+@numba.njit
+def normal_pairs(low, high, out):
+    for i in range(len(low)):
+        out[0, i], out[1, i] = draws.normal_pair32((np.uint64(high[i]) << np.uint64(32)) | np.uint64(low[i]))
+    return out
+
+
+def test_normal_pair32_is_box_and_mullers_transform_for_all_angles_and_radii():
+    some = np.append(np.arange(0, 2**24, 5, dtype=np.uint32), np.uint32(2**24 - 1))
+    step = float(np.float32(9.3623573e-08))  # 3.4e-5 short of pi / 2**25: the last 5e-5 rad of a quadrant are not drawn
+    assert abs(step * 2**25 / np.pi - 1) < 4e-5
+    for low, high in ((np.full_like(some, 2**20), some), (some, np.full_like(some, 5_000_000))):
+        got = normal_pairs(low, high, np.empty((2, len(some)), np.float32))
+        u = (low.astype(np.float32) + np.float32(0.5)).astype(float) * 2.0**-24
+        radius = np.sqrt(-2 * np.log(u))
+        angle = (high + 0.5) * step
+        for z, exact in zip(got, (radius * np.cos(angle), radius * np.sin(angle))):
+            assert (np.abs(z - exact) <= 4e-7 * radius).all()
+
+
+def test_normal_pair32_takes_its_signs_from_bits_of_their_own():
+    high = np.arange(4, dtype=np.uint32) << np.uint32(24)
+    pairs = normal_pairs(np.full(4, 9, np.uint32), high, np.empty((2, 4), np.float32))
+    assert (np.sign(pairs.T) == [[1, 1], [-1, 1], [1, -1], [-1, -1]]).all()
 
 
 def test_tanh32_has_an_absolute_error_below_2e7(uniform):
@@ -102,3 +175,23 @@ def test_bit_casts_invert_each_other():
 def numerics_bits(single, double):
     a, b = numerics.f32_bits(single), numerics.f64_bits(double)
     return a, b, numerics.f32_from_bits(a), numerics.f64_from_bits(b)
+
+
+def test_a_piece_keeps_its_rules_whoever_calls_it_first():
+    @piece
+    def product_and_sum(x):
+        return x * x + x
+
+    @numba.njit(fastmath=True)
+    def caller(x):
+        return product_and_sum(x)
+
+    caller(1.5)
+    assert "fmul double" in product_and_sum.inspect_llvm(product_and_sum.signatures[0])
+
+
+@pytest.mark.parametrize("name", ["log", "exp"])
+def test_regrouping_leaves_the_double_functions_within_four_ulp(name, uniform):
+    function = over(fast(getattr(numerics, name)))
+    for x in (uniform(0.01, 2), uniform(1, 700), 1 + uniform(-1e-9, 1e-9)):
+        assert ulps(function(x), getattr(np, name)(x.astype(np.longdouble))).max() <= 4

@@ -1,11 +1,16 @@
 """The particle filter against exact filters, plain NumPy and its own theory."""
 
+import numba
 import numpy as np
 import pytest
 
 from tests.worlds import leaves
 from wsn_env import Scenario
+from wsn_env.compiling import fast
 from wsn_env.period import predict_moments
+from wsn_env.physics.constants import constants
+from wsn_env.physics.sensing import detection_probability
+from wsn_env.trackers import kernels
 from wsn_env.trackers.particle import ParticleTracker
 from wsn_env.types import State
 
@@ -217,6 +222,110 @@ def test_power_may_be_measured_in_any_unit(unit):
     np.testing.assert_allclose(other.belief.mean, usual.belief.mean, rtol=1e-5)
     np.testing.assert_allclose(other.belief.n_eff, usual.belief.n_eff, rtol=1e-4)
     assert usual.belief.n_eff[0] < 250  # the reports did say something
+
+
+@pytest.mark.parametrize("fusion", ["joint", "pooled"])
+@pytest.mark.parametrize("measurement", list(MEASUREMENTS))
+@pytest.mark.parametrize("particles", [2, 37, 5000])
+def test_fast_kernels_agree_to_rounding(measurement, fusion, particles, monkeypatch):
+    """One period with process noise. float32 rounds positions of 50 m to 4e-6 m and log weights of -100 to 8e-6."""
+    strict, quick = (
+        Filter(particles=particles, measurement=measurement, fusion=fusion, resample_below=0) for _ in range(2)
+    )
+    strict.step(MEASUREMENTS[measurement])
+    monkeypatch.setattr(kernels, "filter_rows", fast(kernels.filter_rows))
+    quick.step(MEASUREMENTS[measurement])
+    np.testing.assert_allclose(quick.belief.particles, strict.belief.particles, atol=2e-5)
+    np.testing.assert_allclose(quick.belief.log_weights, strict.belief.log_weights, atol=1e-4, rtol=1e-5)
+    np.testing.assert_allclose(quick.belief.mean, strict.belief.mean, atol=5e-5)
+    np.testing.assert_allclose(quick.belief.cov, strict.belief.cov, atol=5e-5)
+    np.testing.assert_allclose(quick.belief.n_eff, strict.belief.n_eff, rtol=1e-4)
+
+
+def test_fast_and_strict_kernels_have_caches_of_their_own():
+    strict, quick = kernels.filter_rows, fast(kernels.filter_rows)
+    assert quick is fast(kernels.filter_rows) and quick is not strict
+    assert type(quick._cache) is type(strict._cache)
+    assert quick.py_func.__qualname__ != strict.py_func.__qualname__  # the file's name
+
+
+# --- what detection and silence tell --------------------------------------------------------------------------
+
+
+def teller(weigh_detection, weigh_silence):
+    @numba.njit
+    def tell(x, log_weights, position, delivery, constants):
+        """Weigh by a detection, or where `delivery` is not negative by silence."""
+        if delivery < 0:
+            weigh_detection(x, log_weights, position, constants[0])
+        else:
+            weigh_silence(x, log_weights, position, delivery, constants[0])
+        return log_weights
+
+    return tell
+
+
+TELLERS = {
+    "strict": teller(kernels.weigh_detection, kernels.weigh_silence),
+    "fast": teller(fast(kernels.weigh_detection), fast(kernels.weigh_silence)),
+}
+
+
+@pytest.mark.parametrize("mode", TELLERS)
+@pytest.mark.parametrize(
+    "detection",
+    [
+        {},
+        {"ceiling": 1.0},
+        {"decay": 5.0, "decay_power": 0.5},
+        {"decay": 0.0},
+        {"decay": 1e-3, "edge_power": 0.1},
+        {"radius_m": 300.0, "softness": 1.0},
+    ],
+)
+def test_detection_and_silence_weigh_like_plain_numpy(detection, mode):
+    """Distances are off by half an ulp, 2e-5 m at 300 m; p may change by a factor e within a decimetre."""
+    scenario = Scenario.named("PreDC-v0", **detection)
+    record, told = constants(scenario), TELLERS[mode]
+    inner, reach = record["inner_m"][0], record["reach_m"][0]
+    edges = np.array([0, inner, reach, 2 * reach, 1e6], np.float32)
+    neighbours = np.nextafter(edges[1:3], np.float32(0)), np.nextafter(edges[1:3], np.float32(1e9))
+    distances = np.concatenate([edges, *neighbours, np.linspace(0, 1.2 * reach, 10_000)]).astype(np.float32)
+    x = np.zeros((4, len(distances)), np.float32)
+    x[2] = distances
+    p = np.clip(detection_probability(distances.astype(float), scenario.detection), 1e-6, 1 - 1e-6)
+    for delivery in (-1.0, 0.0, 0.8, 1.0):
+        weights = told(x, np.zeros(len(distances), np.float32), np.zeros(2), delivery, record)
+        exact = np.log(p) if delivery < 0 else np.log1p(-delivery * p)
+        assert (weights <= 0).all()
+        np.testing.assert_allclose(weights, exact, atol=1e-4)
+    again = told(x, weights.copy(), np.zeros(2), 1.0, record)
+    np.testing.assert_allclose(again, 2 * weights, rtol=1e-6)  # added, not set
+
+
+@pytest.mark.parametrize("nodes", [[], [0], [2, 3], [0, 2, 3]])
+def test_every_awake_node_weighs_by_its_report_or_by_its_silence(nodes):
+    """The head is node 2, the members are 0, 1 and 3, of which 1 has no energy; measurements that tell nothing."""
+    sensing = dict(radius_m=20.0, packet_success=0.7, retries=0, noise_m=1e9)
+    filter = Filter(particles=300, silent_information=True, resample_below=0, **sensing)
+    network = filter.state.network
+    network.battery[:] = [1.0, 0.0, 1.0, 1.0]
+    network.head[:], network.n_members[:], network.members[0, :3] = 2, 3, [0, 1, 3]
+    filter.step([(node, 0.0, 0.0) for node in nodes])
+    x, weights = filter.belief.particles[0], filter.belief.log_weights[0]
+    exact = np.zeros(300)
+    for node in (2, 0, 3):
+        p = detection_probability(np.hypot(*(x[::2].T - NODES[node]).T), filter.scenario.detection)
+        p = np.clip(p, 1e-6, 1 - 1e-6)
+        exact += np.log(p) if node in nodes else np.log1p(-p * (1 if node == 2 else filter.scenario.radio.delivery))
+    np.testing.assert_allclose(weights, exact - exact.max(), atol=1e-4)
+
+
+def test_silence_tells_nothing_without_a_head():
+    filter = Filter(particles=300, silent_information=True, resample_below=0)
+    filter.state.network.head[:] = -1
+    filter.step([])
+    assert (filter.belief.log_weights == 0).all()
 
 
 # --- resampling -----------------------------------------------------------------------------------------------

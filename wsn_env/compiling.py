@@ -3,8 +3,9 @@
 `lean_kernel` and `lean_piece` do without Numba's reference counts, an atomic operation for every row of an array taken,
 which cost more than a period's physics. They must allocate nothing: Numba raises "NRT required" where one does.
 
-Strict by construction: no fastmath, no BLAS, no libm. The GIL is released, so that `over_rows` can share a
-batch among threads; rows never meet, so the number of threads cannot change a bit.
+Strict by construction: no fastmath, no BLAS, no libm; `fast` compiles the same source a second time without that. The
+GIL is released, so that `over_rows` can share a batch among threads; rows never meet, so the number of threads cannot
+change a bit.
 """
 
 import functools
@@ -13,15 +14,21 @@ import os
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import FunctionType
 
 import numba
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.dispatcher import Dispatcher
 
 PACKAGE = Path(__file__).parent
 SERIAL_ROWS = 8  # up to here one thread is faster than handing work out
 
-piece = numba.njit(error_model="numpy", nogil=True, _nrt=True)
-lean_piece = numba.njit(error_model="numpy", nogil=True, _nrt=False)
+FAST = {"reassoc", "contract", "arcp", "nsz"}  # not nnan, ninf: infinities and NaN mean what they mean
+
+# fastmath=False is said aloud: a piece that says nothing takes over what its first caller has.
+piece = numba.njit(error_model="numpy", nogil=True, fastmath=False, _nrt=True)
+inline_piece = numba.njit(error_model="numpy", nogil=True, fastmath=False, _nrt=True, forceinline=True)  # in long loops
+lean_piece = numba.njit(error_model="numpy", nogil=True, fastmath=False, _nrt=False)
 
 
 def kernel(function):
@@ -32,6 +39,25 @@ def kernel(function):
 def lean_kernel(function):
     """A kernel of lean pieces only."""
     return _cached(lean_piece(function))
+
+
+@functools.cache
+def fast(dispatcher):
+    """The twin of a kernel or piece whose sums and products the compiler may regroup and fuse.
+
+    Its results agree to rounding, but differ from processor to processor. The pieces that the function names get a
+    twin of their own, since a function compiled once keeps its rules wherever it is called from. Lean pieces, the
+    world's, stay strict, and so do those of a module (`draws.stream`): only the filter is fast. The twin's own name
+    keeps the two apart in the cache.
+    """
+    function = dispatcher.py_func
+    seen = {name: function.__globals__.get(name) for name in function.__code__.co_names}
+    pieces = {name: value for name, value in seen.items() if isinstance(value, Dispatcher)}
+    twins = {name: fast(value) for name, value in pieces.items() if value.targetoptions["_nrt"]}
+    twin = FunctionType(function.__code__, function.__globals__ | twins, function.__name__, function.__defaults__)
+    twin.__qualname__ = f"{function.__qualname__}_fast"
+    compiled = numba.jit(**dispatcher.targetoptions | {"fastmath": FAST})(twin)
+    return _cached(compiled) if isinstance(dispatcher._cache, _PackageCache) else compiled
 
 
 def _cached(dispatcher):

@@ -29,6 +29,7 @@ class ClusterEnv(gym.Env):
         order: "nearest" | "information", the menu's order of merit.
         candidates: K, how many nodes actions and observations consider.
         render_mode: None | "rgb_array".
+        fast: a quicker particle filter, equal to rounding, whose bits differ from processor to processor.
         overrides: any quantity of the scenario: `nodes=400, particles=1000, lam=(0.3, 30), motion="sine"`.
 
     An episode is truncated at the horizon and never terminates: a lost track or a dead network goes on.
@@ -45,12 +46,13 @@ class ClusterEnv(gym.Env):
         order: str = "nearest",
         candidates: int = Settings.candidates,
         render_mode: str | None = None,
+        fast: bool = False,
         **overrides,
     ):
         check_render_mode(render_mode, self.metadata)
         self.scenario = Scenario.of(scenario, **overrides)
         self.interface = Interface(self.scenario, Settings(action, observation, reward, order, candidates))
-        self.world = World(self.scenario, threads=1)
+        self.world = World(self.scenario, threads=1, fast=fast)
         self.render_mode = render_mode
         self.action_space = self.interface.action.space
         self.observation_space = self.interface.observation.space

@@ -133,7 +133,7 @@ def sincos(x):
 def log32(x):
     """Natural logarithm of a positive normal float32."""
     bits = f32_bits(x)
-    exponent = (bits - I32(0x3F3504F3)) >> I32(23)
+    exponent = I32(I32(bits - I32(0x3F3504F3)) >> I32(23))
     f = f32_from_bits(I32(bits - I32(exponent << I32(23)))) - F(1)
     p = F(7.0376836292e-2)
     p = p * f - F(1.1514610310e-1)
@@ -151,17 +151,30 @@ def log32(x):
 @piece
 def exp32(x):
     """e**x for float32 x <= 0; clamped at 2**-126, never 0."""
+    rest, power = _exp32_parts(x)
+    return (rest + F(1)) * power
+
+
+@piece
+def expm1_32(x):
+    """e**x - 1 for float32 x <= 0, without loss near 0 (relative error below 3e-7)."""
+    rest, power = _exp32_parts(x)
+    return rest * power + (power - F(1))
+
+
+@piece
+def _exp32_parts(x):
+    """r, p with e**x = (1 + r) p, |r| < 0.42 and p a power of 2."""
     t = max(x * F(1.44269504089), F(-126.0))
     n = np.floor(t + F(0.5))
     f = t - n
-    p = F(1.535336188319500e-4)
-    p = p * f + F(1.339887440266574e-3)
-    p = p * f + F(9.618437357674640e-3)
-    p = p * f + F(5.550332471162809e-2)
-    p = p * f + F(2.402264791363012e-1)
-    p = p * f + F(6.931472028550421e-1)
-    p = p * f + F(1.0)
-    return p * f32_from_bits(I32((I32(n) + I32(127)) << I32(23)))
+    r = F(1.535336188319500e-4)
+    r = r * f + F(1.339887440266574e-3)
+    r = r * f + F(9.618437357674640e-3)
+    r = r * f + F(5.550332471162809e-2)
+    r = r * f + F(2.402264791363012e-1)
+    r = r * f + F(6.931472028550421e-1)
+    return r * f, f32_from_bits(I32((I32(n) + I32(127)) << I32(23)))
 
 
 @piece

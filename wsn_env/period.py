@@ -13,21 +13,12 @@ from wsn_env.types import KEEP_CLUSTER, KEEP_HEAD
 @kernel
 def run(start, stop, cs, heads, chosen, lost, state, outcome):
     """A period with the particle filter at the head, up to where some rows must search; returns how many."""
-    weights, ancestors = scratch(state.belief.particles.shape[2])
+    room = scratch(state.belief.particles.shape[2])
     count = 0
     for b in range(start, stop):
         _sense_and_report(heads[b], chosen[b], state, outcome, b, cs[0])
-        resampled = filter_row(
-            state.key[b],
-            state.row[b].period,
-            state.belief,
-            state.network,
-            state.reports,
-            b,
-            cs[0],
-            weights,
-            ancestors,
-        )
+        key, period = state.key[b], state.row[b].period
+        resampled = filter_row(key, period, state.belief, state.network, state.reports, b, cs[0], room)
         lost[b] = _conclude(resampled, state, outcome, b, cs[0])
         count += lost[b]
     return count

@@ -43,6 +43,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         order: str = "nearest",
         candidates: int = Settings.candidates,
         render_mode: str | None = None,
+        fast: bool = False,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
         **overrides,
@@ -55,7 +56,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self.metadata = type(self).metadata | {"autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
         self.scenario = Scenario.of(scenario, **overrides)
-        self.world = World(self.scenario, threads)
+        self.world = World(self.scenario, threads, fast)
         settings = Settings(action, observation, reward, order, candidates)
         self.interface = Interface(self.scenario, settings, self.world.threads)
         self.single_action_space = self.interface.action.space

@@ -3,13 +3,13 @@
 from wsn_env.scenario import Scenario
 
 
-def make_tracker(scenario: Scenario, threads: int = 1):
+def make_tracker(scenario: Scenario, threads: int = 1, fast: bool = False):
     """The tracker that a scenario names."""
     name = scenario.tracking.tracker
     if name == "particle":
         from wsn_env.trackers.particle import ParticleTracker
 
-        return ParticleTracker(scenario, threads)
+        return ParticleTracker(scenario, threads, fast)
     if name == "ekf":
         from wsn_env.trackers.kalman import EKFTracker
 

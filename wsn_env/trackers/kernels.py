@@ -8,12 +8,17 @@ import numpy as np
 from numba import int32, uint32
 
 from wsn_env import draws
-from wsn_env.compiling import kernel, piece
-from wsn_env.numerics import F, exp, exp32, f32_bits, f32_from_bits, log32
+from wsn_env.compiling import inline_piece, kernel, piece
+from wsn_env.draws import normal_pair32
+from wsn_env.numerics import F, exp, exp32, expm1_32, f32_bits, f32_from_bits, log, log32
 
 LANES = 16
+BLOCK = 8  # particles whose weights are summed apart when resampling
+REACH = 16  # slots of the running maximum's widest window
 SUMS = 16  # w, w^2, four of w d, ten of w d d'
 POSITION, STRENGTH, POWER = range(3)
+LOG_LEAST, LOG_MOST = F(-13.815510558), F(-1.0000005e-6)  # p in [1e-6, 1 - 1e-6]: no report rules a particle out
+TINY = F(1e-30)
 
 
 @piece
@@ -28,7 +33,7 @@ def spread(stream, mean, cov, x, log_weights):
         slope = cov[axis, axis + 1] / sd if sd > 0.0 else 0.0
         rest = np.sqrt(max(cov[axis + 1, axis + 1] - slope * slope, 0.0))
         for i in range(x.shape[1]):
-            e0, e1 = draws.normal_pair32(draws.bits(stream, axis * x.shape[1] + i))
+            e0, e1 = normal_pair32(draws.bits(stream, axis * x.shape[1] + i))
             x[axis, i] = F(mean[axis]) + F(sd) * e0
             x[axis + 1, i] = F(mean[axis + 1]) + F(slope) * e0 + F(rest) * e1
     log_weights[:] = F(0)
@@ -41,7 +46,7 @@ def predict(stream, x, period_s, q):
     t = F(period_s)
     h, g = F(0.5 * period_s * period_s * q), F(period_s * q)
     for i in range(x.shape[1]):
-        ax, ay = draws.normal_pair32(draws.bits(stream, i))
+        ax, ay = normal_pair32(draws.bits(stream, i))
         px[i] += t * vx[i] + h * ax
         vx[i] += g * ax
         py[i] += t * vy[i] + h * ay
@@ -78,6 +83,80 @@ def weigh(x, log_weights, first, step, position, value, c):
             dy = py[i] - sy
             r = z - top * exp32(-slope * (log32(max(dx * dx + dy * dy, floor)) - log_floor))
             log_weights[i] -= F(0.5) * (r * r)
+
+
+@piece
+def weigh_awake(x, log_weights, network, nodes, b, c):
+    """Add what it tells that of the awake nodes of row b just `nodes` (m,) reported, whatever they measured.
+
+    The head's own report is always heard, a member's with probability `delivery`. A node without energy tells nothing.
+    """
+    positions, battery, standing = network.positions[b], network.battery[b], network.row[b]
+    if standing.head < 0:
+        return
+    for k in range(-1, standing.n_members):
+        node = standing.head if k < 0 else network.members[b, k]
+        reported = False
+        for other in nodes:
+            reported |= other == node
+        if reported:
+            weigh_detection(x, log_weights, positions[node], c)
+        elif battery[node] > 0.0:
+            weigh_silence(x, log_weights, positions[node], 1.0 if k < 0 else c.delivery, c)
+
+
+@piece
+def weigh_detection(x, log_weights, position, c):
+    """Add to every particle the log probability that the node at `position`, which reported, detects a target there."""
+    px, py = x[0], x[2]
+    sx, sy = F(position[0]), F(position[1])
+    curve = detection_curve(c)
+    for i in range(x.shape[1]):
+        dx = px[i] - sx
+        dy = py[i] - sy
+        log_weights[i] += log_detection32(dx * dx + dy * dy, curve)
+
+
+@piece
+def weigh_silence(x, log_weights, position, delivery, c):
+    """Add log(1 - delivery p(d)): the node at `position` was awake and nothing was heard of it.
+
+    Args:
+        delivery: probability that a report of the node arrives; 1 for the head.
+    """
+    px, py = x[0], x[2]
+    sx, sy = F(position[0]), F(position[1])
+    curve = detection_curve(c)
+    sent, lost = F(delivery), F(1.0 - delivery)
+    for i in range(x.shape[1]):
+        dx = px[i] - sx
+        dy = py[i] - sy
+        unseen = -expm1_32(log_detection32(dx * dx + dy * dy, curve))
+        log_weights[i] += log32(min(lost + sent * unseen, F(1)))  # <= 0, as log weights have to be
+
+
+@piece
+def detection_curve(c):
+    """Eqs. 2-3 in float32 and logarithms: inner and outer end [m], ln l1, b1, b2, ln l2."""
+    return (
+        F(c.inner_m),
+        F(c.reach_m),
+        F(log(max(c.decay, 1e-30))),
+        F(c.decay_power),
+        F(c.edge_power),
+        F(log(max(c.ceiling, 1e-30))),
+    )
+
+
+@inline_piece
+def log_detection32(squared, curve):
+    """Log of the detection probability at a squared distance [m^2] (eqs. 2-3), clipped to finite odds."""
+    inner, reach, log_decay, decay_power, edge_power, log_ceiling = curve
+    d = np.sqrt(squared)
+    a1, a2 = d - inner, reach - d
+    y = log_decay + decay_power * log32(max(a1, TINY)) - edge_power * log32(max(a2, TINY))
+    fall = exp32(min(y, F(3))) * F(a1 > F(0)) + F(20) * F(a2 <= F(0))  # beyond e**3 p is below the least anyway
+    return min(max(log_ceiling - fall, LOG_LEAST), LOG_MOST)
 
 
 @piece
@@ -158,36 +237,73 @@ def _gather(w, d0, d1, d2, d3, lanes, k):
 
 
 @piece
-def resample(u, x, log_weights, weights, total, ancestors):
-    """Systematic resampling in place.
-
-    Instead of searching, count how many particles end before each slot: the running count is the slot's ancestor.
+def resample(u, x, log_weights, weights, total, slots, states):
+    """Systematic resampling in place, without a search.
 
     Args:
         u: U[0, 1), the common offset of the slots.
-        weights: (P,) summing to `total`; used as scratch.
-        ancestors: (P + 1,) int32 scratch.
+        weights: (P,) summing to `total`.
+        slots: (3, P + 16) int32 scratch that starts with zeros.
+        states: (2, P) complex128 scratch.
     """
-    n = x.shape[1]
-    ancestors[:] = 0
-    ancestors[0] = 1
-    scale = np.float64(n) / total
-    cumulated = 0.0
-    last = int32(n)
-    for i in range(n - 1):
-        cumulated += np.float64(weights[i])
-        ancestors[uint32(min(int32(cumulated * scale - u + 1.0), last))] += int32(1)
-    ancestor = int32(-1)
-    for k in range(n):
-        ancestor += ancestors[k]
-        ancestors[k] = ancestor
-    for axis in range(4):
-        coordinate = x[axis]
-        for k in range(n):
-            weights[k] = coordinate[uint32(ancestors[k])]  # unsigned: no wrap-around to provide for, a quarter faster
-        for k in range(n):
-            coordinate[k] = weights[k]
+    inherit(u, weights, total, slots[0], slots[1], slots[2])
+    draw(x, slots[2, REACH:], states[0], states[1])
     log_weights[:] = F(0)
+
+
+@piece
+def inherit(u, weights, total, ended, recent, ancestors):
+    """Find every slot's ancestor: the particle after the last one that ends before the slot.
+
+    Ends ascend, so of the particles that end at one place the last to be written stays. What is left is a running
+    maximum: over 4 slots, over 16, and over all in strides of 16, in vectors (one number after the other it would be a
+    branch that nobody can foretell). Sums restart with every block, so that blocks need not wait for each other.
+
+    Args:
+        ended, recent: (P + 16,) scratch; 0 or one more than the last particle that ends there, from 3 and 12 on.
+        ancestors: (P + 16,) filled from 16 on; 0 before.
+    """
+    n = len(weights)
+    for k in range(n + 4):
+        ended[k] = 0
+    scale = np.float64(n) / total
+    base = 1.0 - u
+    last = int32(n)
+    whole = (n - 1) // BLOCK * BLOCK
+    for o in range(0, whole, BLOCK):
+        cumulated = 0.0
+        for k in range(BLOCK):
+            cumulated += np.float64(weights[o + k]) * scale
+            ended[uint32(3) + uint32(min(int32(base + cumulated), last))] = int32(o + k + 1)
+        base += cumulated
+    for i in range(whole, n - 1):
+        base += np.float64(weights[i]) * scale
+        ended[uint32(3) + uint32(min(int32(base), last))] = int32(i + 1)
+    for k in range(n):
+        recent[k + 12] = max(max(ended[k], ended[k + 1]), max(ended[k + 2], ended[k + 3]))
+    for k in range(n):
+        here = max(max(recent[k], recent[k + 4]), max(recent[k + 8], recent[k + 12]))
+        ancestors[k + REACH] = max(here, ancestors[k])
+
+
+@piece
+def draw(x, ancestors, states, drawn):
+    """Replace every particle by its ancestor; its four numbers move as one of 16 bytes."""
+    n = x.shape[1]
+    px, vx, py, vy = x[0], x[1], x[2], x[3]
+    before, after = states.view(np.float32), drawn.view(np.float32)
+    for i in range(n):
+        before[4 * i] = px[i]
+        before[4 * i + 1] = vx[i]
+        before[4 * i + 2] = py[i]
+        before[4 * i + 3] = vy[i]
+    for k in range(n):
+        drawn[k] = states[uint32(ancestors[k])]  # unsigned: no wrap-around to provide for
+    for k in range(n):
+        px[k] = after[4 * k]
+        vx[k] = after[4 * k + 1]
+        py[k] = after[4 * k + 2]
+        vy[k] = after[4 * k + 3]
 
 
 @piece
@@ -195,7 +311,7 @@ def relocate(stream, mean, cov, x):
     """Draw the particles' positions anew ~ N(mean, cov); velocities and weights stay."""
     sx, sy = F(np.sqrt(cov[0, 0])), F(np.sqrt(cov[2, 2]))
     for i in range(x.shape[1]):
-        e0, e1 = draws.normal_pair32(draws.bits(stream, i))
+        e0, e1 = normal_pair32(draws.bits(stream, i))
         x[0, i] = F(mean[0]) + sx * e0
         x[2, i] = F(mean[2]) + sy * e1
 
@@ -219,15 +335,16 @@ def relocate_rows(start, stop, keys, periods, rows, belief):
 
 
 @piece
-def filter_row(key, period, belief, network, reports, b, c, weights, ancestors):
+def filter_row(key, period, belief, network, reports, b, c, room):
     """One period of row b: `period` counts from 1; the belief is that after the period before.
 
     Args:
-        weights, ancestors: scratch for P particles.
+        room: what `scratch` gives.
 
     Returns: whether the particles were resampled.
     """
     x, log_weights, row = belief.particles[b], belief.log_weights[b], belief.row[b]
+    weights, slots, states = room
     n, count = x.shape[1], reports.count[b]
     predict(draws.stream(key, period, draws.PROCESS), x, c.period_s, c.q)
     for j in range(count):
@@ -236,24 +353,30 @@ def filter_row(key, period, belief, network, reports, b, c, weights, ancestors):
             weigh(x, log_weights, j, count, position, value, c)
         else:  # a constant stride of 1 lets the compiler use vectors
             weigh(x, log_weights, 0, 1, position, value, c)
+    if c.silent_information:
+        weigh_awake(x, log_weights, network, reports.node[b, :count], b, c)
     normalise(log_weights, weights)
     row.n_eff, total = moments(x, weights, row.predicted_mean, row.mean, row.cov)
     resampled = row.n_eff < c.resample_below * n
     if resampled:
         u = draws.uniform(draws.stream(key, period, draws.RESAMPLING), 0)
-        resample(u, x, log_weights, weights, total, ancestors)
+        resample(u, x, log_weights, weights, total, slots, states)
     return resampled
 
 
 @piece
 def scratch(particles):
-    """Room that `filter_row` needs: weights and ancestors."""
-    return np.empty(particles, np.float32), np.empty(particles + 1, np.int32)
+    """Room that `filter_row` needs: weights, slots and states."""
+    return (
+        np.empty(particles, np.float32),
+        np.zeros((3, particles + REACH), np.int32),
+        np.empty((2, particles), np.complex128),
+    )
 
 
 @kernel
 def filter_rows(start, stop, constants, keys, periods, belief, network, reports, resampled):
     """One period of the filter alone."""
-    weights, ancestors = scratch(belief.particles.shape[2])
+    room = scratch(belief.particles.shape[2])
     for b in range(start, stop):
-        resampled[b] = filter_row(keys[b], periods[b], belief, network, reports, b, constants[0], weights, ancestors)
+        resampled[b] = filter_row(keys[b], periods[b], belief, network, reports, b, constants[0], room)

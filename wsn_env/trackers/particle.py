@@ -1,5 +1,6 @@
 """The cluster particle filter (Xiang & Guo, 2013, eqs. 9-15); its arithmetic stands in `kernels`."""
 
+from wsn_env import compiling
 from wsn_env.compiling import over_rows
 from wsn_env.physics.constants import constants
 from wsn_env.scenario import Scenario
@@ -15,9 +16,10 @@ class ParticleTracker:
     reports only predicts.
     """
 
-    def __init__(self, scenario: Scenario, threads: int = 1):
+    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
         self.particles = scenario.tracking.particles
         self.threads = threads
+        self._filter_rows = compiling.fast(kernels.filter_rows) if fast else kernels.filter_rows
         self._constants = constants(scenario)
 
     def start(self, keys, periods, rows, belief: Belief) -> None:
@@ -31,7 +33,7 @@ class ParticleTracker:
     def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
         """Predict, weigh, read mean and covariance, resample, in place."""
         over_rows(
-            kernels.filter_rows,
+            self._filter_rows,
             len(keys),
             self.threads,
             self._constants,
