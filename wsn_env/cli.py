@@ -1,8 +1,9 @@
-"""The command `wsn`, also `python -m wsn_env`: evaluate and reproduce."""
+"""The command `wsn`, also `python -m wsn_env`: evaluate, reproduce, compile."""
 
 from __future__ import annotations
 
 import sys
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -48,12 +49,18 @@ class Reproduce:
     """Monte Carlo runs a cell."""
 
 
+@dataclass
+class Compile:
+    """Compile all kernels now and keep them, so that nothing has to wait for it later."""
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; bad input is one line on stderr and exit status 2, Ctrl-C is 130."""
-    commands = {"evaluate": Evaluate, "reproduce": Reproduce}
+    runs = {Evaluate: run_evaluate, Reproduce: run_reproduce, Compile: run_compile}
+    commands = {kind.__name__.lower(): kind for kind in runs}
     command = tyro.extras.subcommand_cli_from_dict(commands, prog="wsn", args=arguments)
     try:
-        run_evaluate(command) if isinstance(command, Evaluate) else run_reproduce(command)
+        runs[type(command)](command)
     except (ValueError, OSError, MemoryError) as problem:
         print(f"wsn: {problem}", file=sys.stderr)
         return 2
@@ -92,6 +99,27 @@ def run_reproduce(command: Reproduce) -> None:
     from wsn_env.papers import reproduce
 
     reproduce(command.paper, command.out, command.runs)
+
+
+def run_compile(command: Compile) -> None:
+    """`wsn compile`: play a little of everything."""
+    from wsn_env.env import ClusterEnv
+    from wsn_env.evaluation import episodes
+    from wsn_env.policies import make_policy
+    from wsn_env.world import World
+
+    started = time.perf_counter()
+    for fast in (False, True):
+        for order in ("nearest", "information"):
+            env = ClusterEnv(particles=20, periods=3, start="search", order=order, fast=fast)
+            env.reset(seed=0)
+            env.step(10)
+    for tracker in ("particle", "snapshot"):
+        scenario = Scenario.named("PreDC-v0", particles=20, periods=2, tracker=tracker)
+        for policy in ("pre_dc", "random"):
+            for _ in episodes(make_policy(policy, scenario), World(scenario), [0]):
+                pass
+    print(f"compiled in {time.perf_counter() - started:.0f} s")
 
 
 def make_scenario(name: str, pairs: list[str], tracks: list[Path], **further) -> Scenario:

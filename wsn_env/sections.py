@@ -260,6 +260,11 @@ class Tracking(Section):
     tracker: str = quantity("particle", "particle | ekf | snapshot", choices=("particle", "ekf", "snapshot"))
     particles: int = quantity(5000, "number of particles P", at_least=2, at_most=1_000_000, whole=True)
     fusion: str = quantity("joint", "joint (members send z) or pooled (eqs. 9-15)", choices=("joint", "pooled"))
+    silent_information: bool = quantity(
+        False,
+        "weigh with who reported and who kept silent, too (particle only)",
+        choices=(True, False),
+    )
     resample_below: float = quantity(2 / 3, "resample at N_eff below this share of P (eq. 14)", at_least=0, at_most=1)
     filter_q: float | None = quantity(
         None,
@@ -274,3 +279,11 @@ class Tracking(Section):
     search: bool = quantity(True, "search for lost tracks", choices=(True, False))
     search_miss: float = quantity(1e-3, "search when missing so long was less probable", above=0, at_most=1)
     search_gap: int = quantity(5, "periods between searches, at least", at_least=1, whole=True)
+
+    def __post_init__(self):
+        super().__post_init__()
+        if self.silent_information and self.tracker != "particle":
+            raise ScenarioError(
+                f"Tracking.silent_information = True: allowed is False with the tracker {self.tracker!r}; only the"
+                " particle filter knows what silence means"
+            )

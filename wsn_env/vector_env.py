@@ -179,11 +179,13 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             actions = {name: np.stack([one[name] for one in actions]) for name in actions[0]}
         if isinstance(actions, dict):
             actions = {name: np.asarray(value) for name, value in actions.items()}
-        else:
-            actions = np.asarray(actions)
-            if actions.dtype.kind in "iu":
-                actions = actions.astype(self.action_space.dtype, copy=False)
-        if not self.action_space.contains(actions):
+            valid = self.action_space.contains(actions)
+        else:  # the space's own `contains` takes half as long as all rows' physics
+            actions, space = np.asarray(actions), self.action_space
+            most = space.high if isinstance(space, gym.spaces.Box) else space.nvec - 1
+            valid = actions.shape == space.shape and actions.dtype.kind in "iu"
+            valid = valid and bool((actions >= 0).all() and (actions <= most).all())
+        if not valid:
             raise ValueError(f"actions {actions!r} are not in {self.action_space}")
         return actions
 
@@ -194,12 +196,13 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
 
 def _masked(info: dict[str, np.ndarray], rows: np.ndarray) -> dict[str, np.ndarray]:
     """Gymnasium's form of a vector info: zeros where a row has none, and a mask under "_name"."""
-    out = {}
+    out, everywhere, mask = {}, rows.all(), rows.copy()
     for name, value in info.items():
-        value = value.copy()
-        value[~rows] = 0
+        if not everywhere:
+            value = value.copy()
+            value[~rows] = 0
         out[name] = value
-        out[f"_{name}"] = rows.copy()
+        out[f"_{name}"] = mask
     return out
 
 

@@ -17,18 +17,18 @@ def mean_detection(positions, node, mean, cov, c):
 
 
 @lean_piece
-def gain(positions, node, mean, cov, p00, p01, p11, c):
+def gain(detection, positions, node, mean, cov, p00, p01, p11, c):
     """Expected drop of the position covariance's trace by one report of `node` [m^2], and the covariance after it.
 
     Linearised at the prediction. That the node may not detect enters as a measurement noise of R / p.
 
     Args:
+        detection: its `mean_detection` p.
         p00, p01, p11: position covariance so far, after the nodes already chosen [m^2].
 
     Returns: gain, and the three entries of the covariance after.
     """
-    p = max(mean_detection(positions, node, mean, cov, c), 1e-6)
-    r = c.noise * c.noise / p
+    r = c.noise * c.noise / max(detection, 1e-6)
     if c.model == 0:
         s00, s11 = p00 + r, p11 + r
         det = s00 * s11 - p01 * p01
@@ -60,20 +60,23 @@ def order_by_information(start, stop, cs, positions, heads, beliefs, nodes, orde
     """
     c = cs[0]
     size = nodes.shape[1]
-    used = np.empty(size, np.bool_)
+    used, detections = np.empty(size, np.bool_), np.zeros(size)
     for b in range(start, stop):
         mean, cov = beliefs[b].predicted_mean, beliefs[b].predicted_cov
         p00, p01, p11 = cov[0, 0], cov[0, 2], cov[2, 2]
         if heads[b] >= 0:
-            _, p00, p01, p11 = gain(positions[b], heads[b], mean, cov, p00, p01, p11, c)
+            detection = mean_detection(positions[b], heads[b], mean, cov, c)
+            _, p00, p01, p11 = gain(detection, positions[b], heads[b], mean, cov, p00, p01, p11, c)
         ordered[b] = -1
         for k in range(size):
             used[k] = nodes[b, k] < 0 or nodes[b, k] == heads[b]
+            if not used[k]:
+                detections[k] = mean_detection(positions[b], nodes[b, k], mean, cov, c)
         for slot in range(size):
             best, most, after = -1, -1.0, (p00, p01, p11)
             for k in range(size):
                 if not used[k]:
-                    g, q00, q01, q11 = gain(positions[b], nodes[b, k], mean, cov, p00, p01, p11, c)
+                    g, q00, q01, q11 = gain(detections[k], positions[b], nodes[b, k], mean, cov, p00, p01, p11, c)
                     if g > most:
                         best, most, after = k, g, (q00, q01, q11)
             if best < 0:

@@ -123,7 +123,8 @@ def _encode_candidate(node, head, members, n, positions, m, p, ex, ey, c, g):
     dx, dy = (positions[node, 0] - m[0]) / c.radius_m, (positions[node, 1] - m[2]) / c.radius_m
     g[0] = dx * ex + dy * ey
     g[1] = dy * ex - dx * ey
-    g[3] = mean_detection(positions, node, m, p, c)
+    detection = mean_detection(positions, node, m, p, c)
+    g[3] = detection
     if head >= 0:
         g[4] = np.sqrt(squared_distance(positions, node, positions[head, 0], positions[head, 1])) / c.radius_m
     for k in range(n):
@@ -132,7 +133,7 @@ def _encode_candidate(node, head, members, n, positions, m, p, ex, ey, c, g):
     if node == head:
         g[5] = 1.0
         g[6] = 1.0
-    drop = gain(positions, node, m, p, p[0, 0], p[0, 2], p[2, 2], c)[0]
+    drop = gain(detection, positions, node, m, p, p[0, 0], p[0, 2], p[2, 2], c)[0]
     g[8] = 0.25 * log(max(drop / (p[0, 0] + p[2, 2] + 1e-12), 1e-6))
 
 

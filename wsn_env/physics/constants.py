@@ -41,6 +41,7 @@ CONSTANTS = np.dtype(
         # tracking
         ("q", "f8"),
         ("pooled", "i8"),
+        ("silent_information", "i8"),
         ("resample_below", "f8"),
         ("search", "i8"),
         ("log_search_miss", "f8"),
@@ -91,6 +92,7 @@ def constants(scenario: Scenario) -> np.ndarray:
         sensing_j=1e-9 * r.sensing_nj,
         q=scenario.filter_q,
         pooled=t.fusion == "pooled",
+        silent_information=t.silent_information,
         resample_below=t.resample_below,
         search=t.search,
         log_search_miss=math.log(t.search_miss),
