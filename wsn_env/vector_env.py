@@ -198,10 +198,9 @@ def _masked(info: dict[str, np.ndarray], rows: np.ndarray) -> dict[str, np.ndarr
     """Gymnasium's form of a vector info: zeros where a row has none, and a mask under "_name"."""
     out, everywhere, mask = {}, rows.all(), rows.copy()
     for name, value in info.items():
+        out[name] = value.copy()
         if not everywhere:
-            value = value.copy()
-            value[~rows] = 0
-        out[name] = value
+            out[name][~rows] = 0
         out[f"_{name}"] = mask
     return out
 
