@@ -29,6 +29,7 @@ def scenarios(draw, trackers=("particle", "particle", "ekf", "snapshot"), **fixe
         tracker=draw(st.sampled_from(trackers)),
         particles=draw(st.sampled_from([2, 3, 16, 17, 50, 300])),
         fusion=draw(st.sampled_from(["joint", "pooled"])),
+        silent_information=draw(st.sampled_from([False, False, True])),
         resample_below=draw(st.sampled_from([2 / 3, 2 / 3, 0, 1])),
         filter_q=draw(st.sampled_from([None, 0, 0.5])),
         start=draw(st.sampled_from(["known", "known", "search"])),
@@ -36,7 +37,9 @@ def scenarios(draw, trackers=("particle", "particle", "ekf", "snapshot"), **fixe
         search=draw(st.sampled_from([True, True, False])),
         search_gap=draw(st.integers(1, 6)),
     )
-    return Scenario.named("PreDC-v0", **(overrides | fixed))
+    overrides |= fixed
+    overrides["silent_information"] &= overrides["tracker"] == "particle"
+    return Scenario.named("PreDC-v0", **overrides)
 
 
 def choices(seed, period, rows, nodes):

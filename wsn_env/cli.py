@@ -106,6 +106,7 @@ def run_compile(command: Compile) -> None:
     from wsn_env.env import ClusterEnv
     from wsn_env.evaluation import episodes
     from wsn_env.policies import make_policy
+    from wsn_env.view import View
     from wsn_env.world import World
 
     started = time.perf_counter()
@@ -117,8 +118,8 @@ def run_compile(command: Compile) -> None:
     for tracker in ("particle", "snapshot"):
         scenario = Scenario.named("PreDC-v0", particles=20, periods=2, tracker=tracker)
         for policy in ("pre_dc", "random"):
-            for _ in episodes(make_policy(policy, scenario), World(scenario), [0]):
-                pass
+            for state, _ in episodes(make_policy(policy, scenario), World(scenario), [0]):
+                View.from_arrays(View.of(state).as_arrays())
     print(f"compiled in {time.perf_counter() - started:.0f} s")
 
 

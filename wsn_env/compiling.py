@@ -98,7 +98,8 @@ def kernels_stamp() -> str:
 
 @functools.cache
 def _announce() -> None:
-    print("wsn_env: compiling (once on this machine, up to a minute) ...", file=sys.stderr, flush=True)
+    say = "wsn_env: compiling (once on this machine, up to a minute; `wsn compile` does all of it) ..."
+    print(say, file=sys.stderr, flush=True)
 
 
 _pools: dict[int, ThreadPoolExecutor] = {}

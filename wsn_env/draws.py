@@ -106,5 +106,5 @@ def _uniform_rows(seeds, out):
 def uniforms(seeds, count: int) -> np.ndarray:
     """U[0, 1) numbers for policies: (B, count) from the view's luck (B,), alike in every batch."""
     out = np.empty((len(seeds), count))
-    _uniform_rows(np.asarray(seeds, dtype=np.uint32), out)
+    _uniform_rows(np.ascontiguousarray(seeds, dtype=np.uint32), out)
     return out
