@@ -8,11 +8,14 @@ Reads top to bottom: settings -> environment -> PPO -> saved policy -> paired co
 from __future__ import annotations
 
 import json
+import os
 import sys
 import time
 from collections import deque
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+
+os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # before torch: its threads, waiting busily, would stop all others
 
 import numpy as np
 import torch
