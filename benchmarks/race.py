@@ -112,7 +112,7 @@ def _seconds(call: Callable[[], object], repeats: int, clock: Callable[[], float
 
 
 def pin_to_one_thread() -> None:
-    """Start this process anew with one thread for BLAS, OpenMP and XLA, which read that when they are loaded; one core."""
+    """One core; and BLAS, OpenMP and XLA, which read it when they are loaded, on one thread: starts the process anew."""
     if any(os.environ.get(name) != value for name, value in ONE_THREAD.items()):
         os.environ.update(ONE_THREAD)
         os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])

@@ -54,14 +54,8 @@ def step_of(p: Problem):
     def step(key, x, log_weights, sensors, values):
         key, for_noise, for_slots = jax.random.split(key, 3)
         a = p.q * jax.random.normal(for_noise, (2, count), jnp.float32)
-        x = jnp.stack(
-            [
-                x[0] + t * x[1] + 0.5 * t * t * a[0],
-                x[1] + t * a[0],
-                x[2] + t * x[3] + 0.5 * t * t * a[1],
-                x[3] + t * a[1],
-            ]
-        )
+        position, velocity = x[0::2] + t * x[1::2] + 0.5 * t * t * a, x[1::2] + t * a
+        x = jnp.stack([position[0], velocity[0], position[1], velocity[1]])
         if p.measurement == "position":
             squares = (x[0] - values[:, 0:1]) ** 2 + (x[2] - values[:, 1:2]) ** 2
         else:

@@ -134,7 +134,7 @@ def _tracks(scenario: Scenario, rows: int, rng: np.random.Generator) -> np.ndarr
 
 
 def _nearest_nodes(scenario: Scenario, targets: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """(B, PERIODS, m, 2): the nodes nearest to each of the positions (B, PERIODS, 2) in a field drawn anew for a row."""
+    """(B, PERIODS, m, 2): the nodes nearest to the positions (B, PERIODS, 2), in a field drawn for each row."""
     rows, periods, _ = targets.shape
     nearest = np.empty((rows, periods, MEMBERS, 2))
     for row in range(rows):
