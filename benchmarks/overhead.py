@@ -2,9 +2,9 @@
 
     python -m benchmarks.overhead [--rounds N] [--short] [--json FILE]
 
-An episode is recorded: what the tracker was given in every period. The filter's time is that of `ParticleTracker.correct`
-on the same beliefs with the same reports; that they are the same shows in equal bits of the belief and equal decisions
-to resample.
+An episode is recorded: what the tracker was given in every period. The filter's time is that of
+`ParticleTracker.correct` on the same beliefs with the same reports; that they are the same shows in equal bits of the
+belief and equal decisions to resample.
 """
 
 from __future__ import annotations
