@@ -17,8 +17,9 @@ from rich.console import Console
 from benchmarks.race import Claim, Options, Plot, Result, Table, Times, figure, interleave, main
 from benchmarks.stopwatch import Stopwatch
 from benchmarks.vector import ID, MENU_ENTRY
+from wsn_env.compiling import lean_piece
 from wsn_env.interface import Settings
-from wsn_env.physics.field import nearest
+from wsn_env.physics.field import nearest, nearest_candidates
 from wsn_env.scenario import Scenario
 from wsn_env.types import Network
 from wsn_env.world import World
@@ -29,7 +30,7 @@ DENSITY, SIDE = "same density", "same side"
 AT_MOST = 2.0
 EPISODES = 3  # in a turn
 POINTS = 500  # asked for their nearest nodes in a turn
-STEP, RESET, NEAREST = "step", "reset", f"{Settings.candidates} nearest nodes"
+STEP, RESET, NEAREST, COMPILED = "step", "reset", f"{Settings.candidates} nearest", "without the call"
 
 
 def measure(options: Options, console: Console) -> Result:
@@ -50,7 +51,7 @@ def measure(options: Options, console: Console) -> Result:
         result.claims.append(Claim(f"a step's slowest over its fastest, {growth}", AT_MOST, flatness(times, sizes),
                                    at_most=True))  # fmt: skip
         result.figures[growth] = times.seconds
-        for what in (STEP, NEAREST):
+        for what in (STEP, NEAREST, COMPILED):
             lines[f"{what}, {growth}"] = [(nodes, 1e6 * times.median(_name(what, nodes))) for nodes in sizes]
     result.plots.append(Plot("nodes", "Cost against nodes (P = 5000, one thread)", "nodes S", "us", lines))
     return result
@@ -71,9 +72,9 @@ def race(growth: str, sizes: tuple[int, ...], options: Options) -> Times:
         env.reset(seed=0)
         steps[_name(STEP, nodes)] = episodes(env, watch)
         others[_name(RESET, nodes)] = env.reset
-        others[_name(NEAREST, nodes)] = searches(growth, nodes)
+        others[_name(NEAREST, nodes)], others[_name(COMPILED, nodes)] = searches(growth, nodes)
     units = {name: EPISODES * env.unwrapped.scenario.periods for name in steps}
-    units |= {name: POINTS for name in others if name.startswith(NEAREST)}
+    units |= {name: POINTS for name in others if not name.startswith(RESET)}
     found = interleave(steps, options, units, clock=watch, turn_s=0.0)
     few = Options(min(options.rounds, 5), options.short)
     return Times(found.seconds | interleave(others, few, units, turn_s=0.004).seconds)
@@ -93,17 +94,26 @@ def episodes(env: gym.Env, watch: Stopwatch) -> Callable[[], None]:
     return call
 
 
-def searches(growth: str, nodes: int) -> Callable[[], None]:
-    """A call that finds the nodes nearest to some random points, one after the other."""
+def searches(growth: str, nodes: int) -> tuple[Callable[[], None], Callable[[], None]]:
+    """Calls that find the nodes nearest to some random points, one after the other: each called from Python, and all in
+    a compiled loop, as within a step."""
     network = network_of(growth, nodes)
     side_m = scenario_of(nodes, growth)["side_m"]
     points = np.random.default_rng(0).uniform(0.0, side_m, (POINTS, 1, 2))
+
+    found = np.empty(Settings.candidates, np.int64), np.empty(Settings.candidates)
 
     def call():
         for point in points:
             nearest(network, point, Settings.candidates)
 
-    return call
+    return call, lambda: _search(network, points[:, 0], *found)
+
+
+@lean_piece
+def _search(network, points, nodes, distances):
+    for i in range(len(points)):
+        nearest_candidates(network, 0, points[i, 0], points[i, 1], nodes, distances)
 
 
 def network_of(growth: str, nodes: int) -> Network:
@@ -122,13 +132,14 @@ def table(growth: str, sizes: tuple[int, ...], times: Times) -> Table:
     lines = []
     for nodes in sizes:
         line = [f"{nodes:,}"]
-        for what in (STEP, NEAREST):
+        for what in (STEP, NEAREST, COMPILED):
             name, base = _name(what, nodes), _name(what, SMALLEST)
             low, high = times.spread(name, base)
             ratio = f"{figure(times.ratio(name, base))} ({figure(low)}-{figure(high)})"
-            line += [f"{1e6 * times.median(name):.1f}", ratio]
+            line += [figure(1e6 * times.median(name)), ratio]
         lines.append([*line, f"{1e3 * times.median(_name(RESET, nodes)):.3g}"])
-    columns = ["nodes", f"{STEP}, us", "ratio", f"{NEAREST}, us", "ratio", f"{RESET}, ms"]
+    columns = ["nodes", *(cell for what in (STEP, NEAREST, COMPILED) for cell in (f"{what}, us", "ratio"))]
+    columns.append(f"{RESET}, ms")
     return Table(f"{growth.capitalize()} (quartiles)", columns, lines)
 
 
