@@ -4,7 +4,7 @@
 
 An episode is recorded: what the tracker was given in every period. The filter's time is that of
 `ParticleTracker.correct` on the same beliefs with the same reports; that they are the same shows in equal bits of the
-belief and equal decisions to resample.
+belief and equal decisions to resample. The filter's time has a call from Python a period in it, some 4 of 1100 us.
 """
 
 from __future__ import annotations

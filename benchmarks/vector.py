@@ -18,6 +18,7 @@ from rich.console import Console
 
 from benchmarks.race import Claim, Options, Plot, Result, Table, Times, figure, interleave, main
 from wsn_env.compiling import available_threads
+from wsn_env.scenario import Scenario
 
 ID = "wsn_env/PreDC-v0"
 MENU_ENTRY = 10 + 3  # the nearest node leads, with 3 further members
@@ -88,12 +89,7 @@ def _equal(got, wanted, step: int) -> None:
 def race(particles: int, rows: int, options: Options) -> Times:
     """Seconds a step of a row, by contestant."""
     calls = {name: episode(make(name, rows, particles=particles)) for name in MODES}
-    return interleave(calls, options, dict.fromkeys(calls, rows * periods_of(ID)))
-
-
-def periods_of(name: str) -> int:
-    """Steps of an episode."""
-    return gym.spec(name).make().unwrapped.scenario.periods
+    return interleave(calls, options, dict.fromkeys(calls, rows * Scenario.named(ID).periods))
 
 
 def episode(envs: gym.vector.VectorEnv) -> Callable[[], None]:
@@ -112,7 +108,7 @@ def episode(envs: gym.vector.VectorEnv) -> Callable[[], None]:
 
 def against_rows(options: Options, console: Console) -> dict[str, list[tuple[float, float]]]:
     """(B, steps/s) by contestant."""
-    threads, periods = available_threads(), periods_of(ID)
+    threads, periods = available_threads(), Scenario.named(ID).periods
     everybody = f"{NATIVE}, {threads} threads"
     lines: dict[str, list[tuple[float, float]]] = {f"{NATIVE}, 1 thread": [], everybody: [], SYNC: []}
     for rows in SHORT_ROWS if options.short else PLOT_ROWS:
