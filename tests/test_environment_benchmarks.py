@@ -62,7 +62,7 @@ def test_nodes(monkeypatch):
     monkeypatch.setattr(nodes, "SHORT_NODES", (225, 900))
     monkeypatch.setattr(nodes, "EPISODES", 1)
     result = whole(nodes.measure(GLANCE, QUIET), 2)
-    assert len(result.plots[0].lines) == 4
+    assert len(result.plots[0].lines) == 6
 
 
 def test_the_same_density():
