@@ -25,7 +25,9 @@ from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for `python benchmarks/environment.py`
 
-from benchmarks.naive import BookFilter, NaiveEnv, ParticleFilter
+from benchmarks.filters.book import BookFilter
+from benchmarks.filters.textbook import ParticleFilter
+from benchmarks.naive import NaiveEnv
 from wsn_env.files import replacing
 from wsn_env.scenario import Scenario
 from wsn_env.trackers.kernels import filter_rows

@@ -7,80 +7,10 @@ wsn_env's PreDC-v0 without the search for lost targets (so that it does less).
 import math
 
 import numpy as np
-import scipy.stats
-from filterpy.monte_carlo import systematic_resample
 
+from benchmarks.filters.problem import constant_velocity
+from benchmarks.filters.textbook import ParticleFilter
 from wsn_env.scenario import Scenario
-
-
-def constant_velocity(t: float) -> tuple[np.ndarray, np.ndarray]:
-    """F (4, 4) and G (4, 2) of eqs. 6, 8."""
-    transition = np.array([[1, t, 0, 0], [0, 1, 0, 0], [0, 0, 1, t], [0, 0, 0, 1]])
-    return transition, np.array([[t * t / 2, 0], [t, 0], [0, t * t / 2], [0, t]])
-
-
-class ParticleFilter:
-    """A bootstrap filter over particles (P, 4) = x, vx, y, vy [m, m/s]."""
-
-    def __init__(self, particles: np.ndarray, period_s: float, q: float, noise_m: float, rng: np.random.Generator):
-        self.particles = particles
-        self.weights = np.full(len(particles), 1 / len(particles))
-        self.transition, self.noise_gain = constant_velocity(period_s)
-        self.q, self.noise_m, self.rng = q, noise_m, rng
-
-    def predict(self) -> None:
-        """Constant velocity with white acceleration (eqs. 6, 8)."""
-        noise = self.rng.normal(0, self.q, (len(self.particles), 2))
-        self.particles = self.particles @ self.transition.T + noise @ self.noise_gain.T
-
-    def weigh(self, measurements) -> None:
-        """Multiply the weights with the likelihood of each reported position (eq. 7)."""
-        for z in measurements:
-            squared = np.sum((self.particles[:, [0, 2]] - z) ** 2, axis=1)
-            self.weights *= np.exp(-0.5 * squared / self.noise_m**2)
-        self.weights += 1e-300
-        self.weights /= np.sum(self.weights)
-
-    def estimate(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mean (4,) and covariance (4, 4)."""
-        mean = np.average(self.particles, weights=self.weights, axis=0)
-        deviation = self.particles - mean
-        return mean, (deviation * self.weights[:, None]).T @ deviation
-
-    def effective_size(self) -> float:
-        """N_eff (eq. 14)."""
-        return 1 / np.sum(self.weights**2)
-
-    def resample(self) -> None:
-        """Systematic resampling."""
-        count = len(self.particles)
-        slots = (np.arange(count) + self.rng.random()) / count
-        chosen = np.searchsorted(np.cumsum(self.weights), slots)
-        self.particles = self.particles[np.minimum(chosen, count - 1)]
-        self.weights = np.full(count, 1 / count)
-
-
-class BookFilter(ParticleFilter):
-    """The same filter out of a library's parts, as filterpy's book builds it: SciPy's densities, NumPy's covariance,
-    filterpy's resampling."""
-
-    def weigh(self, measurements) -> None:
-        """Multiply the weights with the likelihood of each reported coordinate (eq. 7)."""
-        for z in measurements:
-            self.weights *= scipy.stats.norm(self.particles[:, 0], self.noise_m).pdf(z[0])
-            self.weights *= scipy.stats.norm(self.particles[:, 2], self.noise_m).pdf(z[1])
-        self.weights += 1e-300
-        self.weights /= np.sum(self.weights)
-
-    def estimate(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mean (4,) and covariance (4, 4)."""
-        mean = np.average(self.particles, weights=self.weights, axis=0)
-        return mean, np.cov(self.particles, rowvar=False, aweights=self.weights, ddof=0)
-
-    def resample(self) -> None:
-        """Systematic resampling."""
-        self.particles = self.particles[systematic_resample(self.weights)]
-        self.weights = np.full(len(self.particles), 1 / len(self.particles))
 
 
 class NaiveEnv:

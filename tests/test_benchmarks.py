@@ -3,7 +3,8 @@
 import pytest
 
 from benchmarks import environment
-from benchmarks.naive import BookFilter, ParticleFilter
+from benchmarks.filters.book import BookFilter
+from benchmarks.filters.textbook import ParticleFilter
 
 
 @pytest.mark.parametrize("kind", [ParticleFilter, BookFilter])

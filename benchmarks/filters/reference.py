@@ -1,0 +1,104 @@
+"""The algorithm of wsn_env's filter in C, compiled on the spot: same random numbers, polynomials, lanes, resampler."""
+
+import ctypes
+import functools
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.filters.contestant import Absent, Contestant
+from benchmarks.filters.problem import MEMBERS, Problem
+from wsn_env import draws
+
+SOURCE = Path(__file__).with_name("reference.c")
+# Neither errno nor traps are results, and without them gcc uses vectors throughout.
+STRICT_FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math")
+
+
+class Model(ctypes.Structure):
+    """`struct model` of the C file."""
+
+    _fields_ = [
+        *((name, ctypes.c_double) for name in ("period_s", "q", "noise", "level", "slope", "floor", "resample_below")),
+        *((name, ctypes.c_int64) for name in ("strength", "members", "process", "resampling")),
+    ]
+
+
+@functools.cache
+def compiled(flags: tuple[str, ...]) -> ctypes.CDLL:
+    """The shared library. Raises Absent where there is no C compiler or it refuses."""
+    compiler = shutil.which("cc")
+    if compiler is None:
+        raise Absent("no C compiler cc")
+    with tempfile.TemporaryDirectory() as folder:
+        library = Path(folder) / "reference.so"
+        command = [compiler, "-std=gnu11", "-shared", "-fPIC", *flags, "-o", library, SOURCE, "-lm"]
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode:
+            raise Absent(f"cc failed: {done.stderr.strip().splitlines()[0]}")
+        return ctypes.CDLL(str(library))
+
+
+class Reference(Contestant):
+    """As fast as C becomes without changing results by reordering; products may be fused with sums."""
+
+    batches = True
+    flags = STRICT_FLAGS
+
+    def __init__(self, problem: Problem):
+        rows, count = problem.rows, problem.count
+        self.model = Model(
+            problem.period_s,
+            problem.q,
+            problem.noise,
+            problem.level,
+            problem.slope,
+            problem.floor,
+            float(problem.resampling),
+            problem.measurement == "rssi",
+            MEMBERS,
+            draws.PROCESS,
+            draws.RESAMPLING,
+        )
+        self.particles = np.empty((rows, 4, count), np.float32)
+        self.log_weights = np.empty((rows, count), np.float32)
+        self.mean, self.cov, self.n_eff = np.empty((rows, 4)), np.empty((rows, 4, 4)), np.empty(rows)
+        self.sensors, self.values = np.empty((rows, MEMBERS, 2)), np.empty((rows, MEMBERS, 2))
+        self.scratch = np.empty(count, np.float32), np.empty(count + 1, np.int32)
+        arrays = (problem.keys, self.sensors, self.values, self.particles, self.log_weights)
+        arrays += (self.mean, self.cov, self.n_eff, *self.scratch)
+        self.arguments = [ctypes.c_void_p(array.ctypes.data) for array in arrays]
+        self.size = ctypes.c_int64(rows), ctypes.c_int64(count)
+        self.call = compiled(self.flags).filter_rows
+        super().__init__(problem)
+
+    def restart(self) -> None:
+        """`mean` is also the point about which the sums run."""
+        self.particles[:] = self.problem.particles
+        self.log_weights[:] = 0.0
+        self.mean[:] = self.problem.prior_mean
+
+    def advance(self, period: int) -> None:
+        """One call."""
+        self.sensors[:] = self.problem.sensors[:, period]
+        self.values[:] = self.problem.values[:, period]
+        self.call(*self.size, ctypes.byref(self.model), ctypes.c_int64(period + 1), *self.arguments)
+
+    def estimate(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As the C function wrote them."""
+        return self.mean, self.cov, self.n_eff
+
+
+class FastReference(Reference):
+    """Sums and products in any order."""
+
+    flags = ("-O3", "-march=native", "-ffast-math")
+
+
+class ExactReference(Reference):
+    """Nothing fused: the bits of wsn_env's strict kernel."""
+
+    flags = (*STRICT_FLAGS, "-ffp-contract=off")

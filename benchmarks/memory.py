@@ -1,0 +1,119 @@
+"""Memory of a row: at most 1.5 (24 P + 64 S) bytes when stepping with donate=True, both as the arrays' sizes and as
+what a process grows by, beyond the scratch of a thread.
+
+    python -m benchmarks.memory [--short] [--json FILE]
+
+The growth is that of the resident memory at its peak, in a process of its own, from before `World.reset` of 256 rows to
+the end of some steps; pages that nothing has touched do not count, so that it may be less than the arrays.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+from benchmarks.race import Claim, Options, Result, Table, main
+from wsn_env.scenario import Scenario
+from wsn_env.types import Cluster, State
+from wsn_env.world import World
+
+ID = "wsn_env/PreDC-v0"
+SIZES = ((5000, 225), (500, 225), (5000, 10_000))  # particles, nodes
+ROWS, SHORT_ROWS = 256, 32
+STEPS = 5
+AT_MOST = 1.5  # times a particle's 24 bytes and a node's 64
+STATUS, CLEAR = Path("/proc/self/status"), Path("/proc/self/clear_refs")
+FRESH = {"MALLOC_MMAP_THRESHOLD_": "16384"}  # arrays get pages of their own, not what is left of others
+HERE = Path(__file__).resolve().parents[1]
+
+
+def measure(options: Options, console: Console) -> Result:
+    """Count, then watch processes grow."""
+    rows = SHORT_ROWS if options.short else ROWS
+    result = Result(
+        name="memory",
+        title="Memory of a row",
+        text=f"Bytes a row of {ID}: the state's arrays, of which the track (101 periods of 4 numbers) grows with"
+        f" neither particles nor nodes; and the growth of a process that steps {rows} rows with donate=True, less the"
+        " scratch of its one thread, which is 8 P + 4 bytes.",
+    )
+    lines = []
+    for particles, nodes in SIZES:
+        console.print(f"memory, {particles} particles, {nodes} nodes", style="dim")
+        size = f"P = {particles:,}, S = {nodes:,}"
+        basis = 24 * particles + 64 * nodes
+        counted = bytes_by_part(State.zeros(1, nodes, Scenario.named(ID).periods, particles))
+        total = sum(counted.values())
+        grown, why = growth(particles, nodes, rows)
+        resident = None if grown is None else (grown - scratch_bytes(particles)) / rows
+        result.claims += [
+            Claim(f"{name} over 24 P + 64 S, {size}", AT_MOST, value and value / basis, at_most=True, why=why)
+            for name, value in (("arrays of a row", total), ("resident memory of a row", resident))
+        ]
+        cells = [f"{value:,}" for value in (*counted.values(), total)]
+        lines.append([f"{particles:,}", f"{nodes:,}", *cells, "" if resident is None else f"{resident:,.0f}"])
+        result.figures[size] = {"rows": rows, "arrays_bytes": counted, "growth_bytes": grown, "basis_bytes": basis}
+    columns = ["P", "S", *counted, "arrays", "resident"]
+    result.tables.append(Table("Bytes a row", columns, lines))
+    return result
+
+
+def bytes_by_part(state: State) -> dict[str, int]:
+    """Bytes a row of a state's arrays, by its parts."""
+    parts = {name: _bytes(getattr(state, name)) // state.rows for name in State._fields}
+    return {"belief": parts.pop("belief"), "track": parts.pop("track")} | parts
+
+
+def _bytes(value) -> int:
+    return sum(map(_bytes, value)) if isinstance(value, tuple) else value.nbytes
+
+
+def scratch_bytes(particles: int) -> int:
+    """Of a thread: weights and ancestors."""
+    return 4 * particles + 4 * (particles + 1)
+
+
+def growth(particles: int, nodes: int, rows: int) -> tuple[int | None, str]:
+    """Bytes by which a process grows at its peak when it resets and steps; or None and why it cannot be told."""
+    if not CLEAR.exists():
+        return None, f"no {CLEAR}"
+    program = f"from benchmarks.memory import grow; grow({particles}, {nodes}, {rows})"
+    command, settings = [sys.executable, "-c", program], os.environ | FRESH
+    child = subprocess.run(command, cwd=HERE, env=settings, capture_output=True, text=True, check=True)
+    return json.loads(child.stdout.splitlines()[-1]), ""
+
+
+def grow(particles: int, nodes: int, rows: int) -> None:
+    """In the child: print the growth. Two rows run before, so that the code is loaded."""
+    world = World(Scenario.named(ID, particles=particles, nodes=nodes), threads=1)
+    kept = [_run(world, 2)]  # not freed: what comes could settle in its place, unseen
+    before = resident_bytes("VmRSS")
+    CLEAR.write_text("5")  # the peak begins anew
+    kept.append(_run(world, rows))
+    print(resident_bytes("VmHWM") - before)
+
+
+def _run(world: World, rows: int) -> State:
+    """Reset, then step clusters of four nodes."""
+    state = world.reset(np.arange(1, rows + 1, dtype=np.uint64))
+    for step in range(STEPS):
+        heads = np.full(rows, step, np.int64)
+        members = np.tile(np.arange(step + 1, step + 4, dtype=np.int32), (rows, 1))
+        state, _ = world.step(state, Cluster(heads, members), donate=True)
+    return state
+
+
+def resident_bytes(name: str) -> int:
+    """VmRSS, now; VmHWM, at its peak."""
+    for line in STATUS.read_text().splitlines():
+        if line.startswith(f"{name}:"):
+            return 1024 * int(line.split()[1])
+    raise OSError(f"{STATUS} has no {name}")
+
+
+if __name__ == "__main__":
+    main(measure, __doc__)

@@ -1,0 +1,103 @@
+"""What is compared is the same, and every measurement runs. (Nothing here looks at a clock.)"""
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from benchmarks import memory, nodes, overhead, training, vector
+from benchmarks.race import Options
+from benchmarks.stopwatch import Stopwatch
+from wsn_env.types import State
+
+GLANCE = Options(rounds=1, short=True)
+QUIET = Console(quiet=True)
+
+
+def whole(result, claims: int):
+    """Every claim is measured, every table complete."""
+    assert len(result.claims) == claims
+    assert all(claim.measured is not None and np.isfinite(claim.measured) for claim in result.claims)
+    assert all(len(row) == len(table.columns) for table in result.tables for row in table.rows)
+    assert all(value > 0 for plot in result.plots for line in plot.lines.values() for point in line for value in point)
+    return result
+
+
+def test_native_and_sync_give_the_same_bits():
+    assert vector.same_bits(particles=300, rows=3, periods=4, steps=12) == 12
+
+
+def test_a_difference_stops_the_race():
+    with pytest.raises(SystemExit):
+        vector._equal([np.zeros(2)], [np.ones(2)], 1)
+
+
+def test_vector(monkeypatch):
+    monkeypatch.setattr(vector, "TARGETS", {500: 4.0})
+    monkeypatch.setattr(vector, "ROWS", 4)
+    monkeypatch.setattr(vector, "SHORT_ROWS", (1, 4))
+    result = whole(vector.measure(GLANCE, QUIET), 1)
+    assert len(result.plots[0].lines) == 3
+
+
+def test_the_replayed_filter_does_the_work_of_the_episode():
+    episode = overhead.Episode(rows=16, particles=400)  # raises if any bit differs
+    assert len(episode.record.corrections) == 100
+    assert sum(one.resampled.sum() for one in episode.record.corrections) > 0
+    assert episode.record.searches > 0  # the beliefs that a search moves too
+
+
+def test_another_work_is_noticed():
+    episode = overhead.Episode(rows=2, particles=100, periods=5)
+    episode.record.corrections[2].reports.value[:] += 1.0
+    with pytest.raises(SystemExit):
+        episode._check_same_beliefs()
+
+
+def test_overhead():
+    result = whole(overhead.measure(GLANCE, QUIET, rows=4, particles=400, periods=10), 1)
+    assert [row[0] for row in result.tables[0].rows][-1] == "whole step"
+
+
+def test_nodes(monkeypatch):
+    monkeypatch.setattr(nodes, "SHORT_NODES", (225, 900))
+    monkeypatch.setattr(nodes, "EPISODES", 1)
+    result = whole(nodes.measure(GLANCE, QUIET), 2)
+    assert len(result.plots[0].lines) == 6
+
+
+def test_the_same_density():
+    wide = nodes.scenario_of(900, nodes.DENSITY)
+    assert wide == {"nodes": 900, "side_m": 200.0}
+    assert nodes.scenario_of(900, nodes.SIDE)["side_m"] == 100.0
+
+
+def test_memory(monkeypatch):
+    monkeypatch.setattr(memory, "SIZES", ((500, 225),))
+    result = memory.measure(GLANCE, QUIET)
+    assert result.claims[0].holds  # sizes of arrays depend on no machine
+    assert result.claims[1].measured is None or result.claims[1].measured > 0
+
+
+def test_bytes_are_those_of_every_array():
+    state = State.zeros(2, 50, 10, 100)
+    parts = memory.bytes_by_part(state)
+    assert set(parts) == set(State._fields)
+    assert parts["belief"] - memory.bytes_by_part(State.zeros(2, 50, 10, 0))["belief"] == 20 * 100
+    assert parts["track"] == 11 * 32
+
+
+def test_training():
+    result = whole(training.measure(GLANCE, QUIET), 1)
+    one = result.figures["runs"][0]
+    assert one["steps"] >= 3 * 32 * 16
+    assert sum(one[part] for part in training.PARTS) == pytest.approx(100)
+
+
+def test_a_stopwatch_counts_inside_only():
+    ticks = iter(range(100))
+    watch = Stopwatch(lambda: next(ticks))
+    for _ in range(3):
+        next(ticks)
+        with watch:
+            pass
+    assert watch() == 3
