@@ -41,7 +41,9 @@ class SB3VecEnv(VecEnv):
 
     def reset(self):
         """New episodes in all rows."""
+        started = time.perf_counter()
         observation, info = self.envs.reset(seed=list(self._seeds))
+        self.seconds += time.perf_counter() - started
         self.reset_infos = [_row_info(info, i) for i in range(self.num_envs)]
         self._reset_seeds()
         self._reset_options()

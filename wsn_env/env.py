@@ -64,9 +64,9 @@ class ClusterEnv(gym.Env):
     def reset(self, *, seed: int | None = None, options: dict | None = None):
         """A new episode: seed fixes field, track and every draw."""
         super().reset(seed=seed)
-        empty = self.world.reset([0]) if self._state is None else self._state
+        state = self.world.allocate(1) if self._state is None else self._state
         key = draws.episode_key(self.np_random)
-        self._state, outcome = self.world.restart(empty, [True], np.array([key]), donate=True)
+        self._state, outcome = self.world.restart(state, [True], np.array([key]), donate=True)
         self._lam = self._state.lam.item()
         self._squares = 0.0
         return self._observe(), self._reward_and_info(outcome)[1]

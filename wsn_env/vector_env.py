@@ -66,6 +66,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._state: State | None = None
         self._view: View | None = None
+        self._last: Any = None  # observation
         self._squares = np.zeros(num_envs)
         self._ended = np.zeros(num_envs, dtype=bool)
 
@@ -86,9 +87,9 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             if seeds[i] is not None or self._generators[i] is None:
                 self._generators[i] = seeding.np_random(seeds[i])[0]
         if self._state is None:
-            self._state = self.world.reset(np.zeros(self.num_envs, np.uint64))
+            self._state = self.world.allocate(self.num_envs)
         outcome = self._restart(rows)
-        return self._observe(), _masked(self._reward_and_info(outcome)[1], rows)
+        return self._observe(rows), _masked(self._reward_and_info(outcome)[1], rows)
 
     def _rows_to_reset(self, options) -> np.ndarray:
         mask = (options or {}).get("reset_mask")
@@ -150,7 +151,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         first = self._restart(truncated)
         _overwrite(info, self._reward_and_info(first)[1], truncated)
         infos |= _masked(info, np.ones(self.num_envs, dtype=bool))
-        return self._observe(), reward, terminated, truncated, infos
+        return self._observe(truncated), reward, terminated, truncated, infos
 
     @property
     def lam(self) -> np.ndarray:
@@ -189,9 +190,14 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             raise ValueError(f"actions {actions!r} are not in {self.action_space}")
         return actions
 
-    def _observe(self):
-        self._view = View.of(self._state)
-        return self.interface.observation.encode(self._view)
+    def _observe(self, rows: np.ndarray | None = None):
+        """The observation of all rows, of which only `rows` have changed since the last."""
+        before, self._view = self._view, View.of(self._state)
+        if rows is None or before is None or rows.all():
+            self._last = self.interface.observation.encode(self._view)
+        else:
+            self._last = self.interface.observation.renew(self._view, rows, before, self._last)
+        return self._last
 
 
 def _masked(info: dict[str, np.ndarray], rows: np.ndarray) -> dict[str, np.ndarray]:

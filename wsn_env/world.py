@@ -43,9 +43,11 @@ class World:
             keys: (B,) uint64, one a row: they fix field, track and every draw to come.
         """
         keys = np.atleast_1d(np.asarray(keys, dtype=np.uint64))
-        s = self.scenario
-        state = State.zeros(len(keys), s.field.nodes, s.periods, self.tracker.particles)
-        return self.restart(state, np.ones(len(keys), bool), keys, donate=True)[0]
+        return self.restart(self.allocate(len(keys)), np.ones(len(keys), bool), keys, donate=True)[0]
+
+    def allocate(self, rows: int) -> State:
+        """Arrays for `restart` to begin episodes in."""
+        return State.zeros(rows, self.scenario.field.nodes, self.scenario.periods, self.tracker.particles)
 
     def restart(self, state: State, rows, keys, donate: bool = False) -> tuple[State, Outcome]:
         """New episodes in some rows of a batch; the others stay, but for the ledger of their last period.

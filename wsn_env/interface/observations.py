@@ -51,11 +51,14 @@ BOUND = 10.0
 
 
 @lean_kernel
-def _encode(start, stop, cs, battery_j, rows, beliefs, network, reports, nodes, distances, out):
-    """Fill out (B, n): BELIEF_FEATURES, then CANDIDATE_FEATURES of each candidate; and the candidates (B, K)."""
+def _encode(start, stop, cs, battery_j, which, rows, beliefs, network, reports, nodes, distances, out):
+    """Fill out (B, n): BELIEF_FEATURES, then CANDIDATE_FEATURES of each candidate; and the candidates (B, K). Only in
+    the rows marked in `which`."""
     c = cs[0]
     size, width = len(BELIEF_FEATURES), len(CANDIDATE_FEATURES)
     for b in range(start, stop):
+        if not which[b]:
+            continue
         m, p, head = beliefs[b].predicted_mean, beliefs[b].predicted_cov, network.row[b].head
         nearest_candidates(network, b, m[0], m[2], nodes[b], distances[b])
         positions, members, n = network.positions[b], network.members[b], network.row[b].n_members
@@ -151,11 +154,21 @@ class CandidatesObservation:
     def encode(self, view: View) -> np.ndarray:
         """(B, n) float32, fresh."""
         rows, candidates = len(view.row), self.shape[0]
-        nodes, distances = np.empty((rows, candidates), np.int64), np.empty((rows, candidates))
-        out = np.empty((rows, *self.space.shape), np.float32)
-        seen = (view.row, view.belief, view.network, view.reports)
-        over_rows(_encode, rows, self._threads, self._constants, self._battery_j, *seen, nodes, distances, out)
-        view.remember_nearest(nodes, distances)
+        view.remember_nearest(np.empty((rows, candidates), np.int64), np.empty((rows, candidates)))
+        return self._fill(np.empty((rows, *self.space.shape), np.float32), view, np.ones(rows, bool))
+
+    def renew(self, view: View, rows, before: View, last) -> np.ndarray:
+        """What `encode` gives, for less where few rows have changed.
+
+        Args:
+            rows: (B,) bool, which have changed since `last` was encoded from the view `before`.
+        """
+        view.remember_nearest(*(array.copy() for array in before.nearest(self.shape[0])))
+        return self._fill(last.copy(), view, rows)
+
+    def _fill(self, out, view: View, rows):
+        seen = (rows, view.row, view.belief, view.network, view.reports, *view.nearest(self.shape[0]))
+        over_rows(_encode, len(rows), self._threads, self._constants, self._battery_j, *seen, out)
         return out
 
 
@@ -181,6 +194,10 @@ class DictObservation:
             "candidates": flat[:, self._flat.size :].reshape(len(flat), *self._flat.shape).copy(),
             "lam": np.minimum(view.lam[:, None].astype(np.float32), self.space["lam"].high[0]),
         }
+
+    def renew(self, view: View, rows, before: View, last) -> dict[str, np.ndarray]:
+        """All of it."""
+        return self.encode(view)
 
 
 class ViewObservation:
@@ -214,6 +231,10 @@ class ViewObservation:
     def encode(self, view: View) -> dict[str, np.ndarray]:
         """A dict of (B, ...) arrays, fresh."""
         return view.as_arrays()
+
+    def renew(self, view: View, rows, before: View, last) -> dict[str, np.ndarray]:
+        """All of it."""
+        return self.encode(view)
 
 
 OBSERVATIONS = {"candidates": CandidatesObservation, "dict": DictObservation, "view": ViewObservation}
