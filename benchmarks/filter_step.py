@@ -96,7 +96,7 @@ def _ratio(times: Times, name: str, ours: str, absent: dict[str, str]) -> tuple[
     """The ratio, or None and why not."""
     for one in (ours, name):
         if one not in times.seconds:
-            return None, absent[one]
+            return None, absent.get(one, f"no {one}")
     return times.ratio(name, ours), ""
 
 
