@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import re
+import textwrap
 from pathlib import Path
 
 from benchmarks.plots import draw
@@ -51,10 +52,11 @@ def machine(results: list[Result]) -> str:
     lines = []
     for facts in _distinct([result.machine for result in results]):
         packages = ", ".join(f"{name} {number}" for name, number in sorted(facts["packages"].items()))
-        lines.append(
+        text = (
             f"{facts['processor']}, {facts['cores']} cores, {facts['l2_bytes'] // 1024} KiB of L2 cache each,"
-            f" {facts['system']}, Python {facts['python']}; {packages}.\n"
+            f" {facts['system']}, Python {facts['python']}; {packages}."
         )
+        lines.append(_wrapped(text))
     return "\n".join(lines)
 
 
@@ -80,12 +82,16 @@ def targets(results: list[Result]) -> str:
 def section(result: Result, heading: bool = True) -> str:
     """Text, tables, what was skipped, plots."""
     parts = [f"## {result.title}\n"] if heading else []
-    parts += [f"{result.text}\n"] if result.text else []
+    parts += [_wrapped(result.text)] if result.text else []
     parts += [f"{table.title}:\n\n{markdown(table)}" for table in result.tables]
     if result.skipped:
-        parts.append("".join(f"Skipped: {name} ({reason}).\n" for name, reason in result.skipped.items()))
+        parts.append("".join(_wrapped(f"Skipped: {name} ({reason}).") for name, reason in result.skipped.items()))
     parts += [f"![{plot.title}](performance_{plot.name}.svg)\n" for plot in result.plots]
     return "\n".join(parts)
+
+
+def _wrapped(text: str) -> str:
+    return textwrap.fill(text, 120, break_on_hyphens=False) + "\n"
 
 
 def markdown(table: Table) -> str:
