@@ -11,7 +11,7 @@ from collections.abc import Iterable
 import numpy as np
 from rich.console import Console
 
-from benchmarks.filters import CONTESTANTS, Absent, Contestant, Looped, Problem, enter, kind_of
+from benchmarks.filters import CONTESTANTS, SLOW_STARTERS, Absent, Contestant, Looped, Problem, enter, kind_of
 from benchmarks.race import Claim, Options, Plot, Result, Table, Times, interleave, l2_bytes, main
 
 STRICT = "wsn_env, strict"
@@ -20,6 +20,7 @@ PLOT_PARTICLES = (500, 1500, 5000, 15_000, 50_000)
 LEAST = 5000  # particles in all rows: below, the call itself counts
 BYTES = 28  # a particle in a row: state, log weight, weight, ancestor
 WITHIN, BEYOND = 20.0, 35.0  # %
+RACED = [name for name in CONTESTANTS if name not in SLOW_STARTERS]
 SHORT_LIMIT = 50_000  # particles in all rows
 FEW = 64  # rows, up to which contestants have turns
 
@@ -27,6 +28,7 @@ FEW = 64  # rows, up to which contestants have turns
 def measure(options: Options, console: Console) -> Result:
     """The grid and its line, then the two plots."""
     result = Result(name="filter_scaling", title="Scaling of the filter")
+    result.skipped = dict.fromkeys(SLOW_STARTERS, "compiles for seconds for every shape")
     grid = kernel_grid(options, console)
     a, b = fit(grid)
     deviations = {point: 100 * (seconds / (a + b * point[0] * point[1]) - 1) for point, seconds in grid.items()}
@@ -111,7 +113,7 @@ def against_particles(options: Options, console: Console, result: Result) -> Lin
     lines: Lines = {}
     for p in sizes:
         console.print(f"every contestant, {p} particles", style="dim")
-        entered = _entered(CONTESTANTS, Problem.draw("position", p), result.skipped)
+        entered = _entered(RACED, Problem.draw("position", p), result.skipped)
         _extend(lines, p, interleave({name: contestant.step for name, contestant in entered.items()}, _few(options)))
     return lines
 
@@ -122,7 +124,7 @@ def against_rows(options: Options, console: Console) -> Lines:
     for rows in ROWS[:3] if options.short else ROWS:
         console.print(f"every contestant, {rows} rows", style="dim")
         problem = shared_cloud(5000, rows)
-        for name in CONTESTANTS:  # one in memory at a time: with many rows some need gigabytes
+        for name in RACED:  # one in memory at a time: with many rows some need gigabytes
             for contestant in _entered([name], problem, {}).values():
                 once = options.short or rows >= FEW
                 times = _once(name, contestant) if once else interleave({name: contestant.step}, _few(options))

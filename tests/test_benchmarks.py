@@ -9,10 +9,11 @@ from rich.console import Console
 
 from benchmarks import __main__ as suite
 from benchmarks import environment, filter_scaling, filter_step, page, plots, race
-from benchmarks.filters import CONTESTANTS, Absent, Contestant, Problem, agreement, enter, kind_of
+from benchmarks.filters import CONTESTANTS, SLOW_STARTERS, Absent, Contestant, Problem, agreement, enter, kind_of
 from benchmarks.filters.exact import estimates
 
 MEASUREMENTS = ("position", "rssi")
+NAMES = [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW_STARTERS)) for name in CONTESTANTS]
 
 
 def skipping_absent(function, *arguments, **keywords):
@@ -23,21 +24,21 @@ def skipping_absent(function, *arguments, **keywords):
 
 
 @pytest.mark.parametrize("measurement", MEASUREMENTS)
-@pytest.mark.parametrize("name", CONTESTANTS)
+@pytest.mark.parametrize("name", NAMES)
 def test_the_same_particles_and_reports_give_the_same_posterior(name, measurement):
     found = skipping_absent(agreement.noiseless_difference, name, measurement, particles=200, periods=3)
     assert found < kind_of(name).tolerance
 
 
 @pytest.mark.parametrize("measurement", MEASUREMENTS)
-@pytest.mark.parametrize("name", CONTESTANTS)
+@pytest.mark.parametrize("name", NAMES)
 def test_with_their_own_noise_they_agree_to_monte_carlo_accuracy(name, measurement):
     found = skipping_absent(agreement.noisy_deviations, name, measurement, particles=500, rows=4)
     assert len(found) == (2 if measurement == "position" else 1)
     assert all(value < agreement.DEVIATIONS for value in found.values()), found
 
 
-@pytest.mark.parametrize("name", CONTESTANTS)
+@pytest.mark.parametrize("name", NAMES)
 def test_every_contestant_steps_and_starts_over(name):
     contestant = skipping_absent(enter, name, Problem.draw("position", particles=100, rows=2))
     means, covs, n_eff = estimates(contestant, periods=22)
@@ -121,8 +122,8 @@ def few(monkeypatch):
     """Claims without the slower contestants."""
     names = ("wsn_env, strict", "wsn_env, fast", "NumPy f32, tuned")
     chosen = {name: CONTESTANTS[name] for name in names} | {"nobody": ("nobody", "Nobody")}
-    for module in (filter_step, filter_scaling):
-        monkeypatch.setattr(module, "CONTESTANTS", chosen)
+    monkeypatch.setattr(filter_step, "CONTESTANTS", chosen)
+    monkeypatch.setattr(filter_scaling, "RACED", list(chosen))
     monkeypatch.setitem(CONTESTANTS, "nobody", chosen["nobody"])
     monkeypatch.setattr(filter_scaling, "SHORT_LIMIT", 8000)
     monkeypatch.setattr(race, "SHORT_TURN_S", 0.0)
