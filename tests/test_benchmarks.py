@@ -40,10 +40,10 @@ def test_with_their_own_noise_they_agree_to_monte_carlo_accuracy(name, measureme
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_contestant_steps_and_starts_over(name):
-    contestant = skipping_absent(enter, name, Problem.draw("position", particles=100, rows=2))
+    contestant = skipping_absent(enter, name, Problem.draw("position", particles=500, rows=4))
     means, covs, n_eff = estimates(contestant, periods=22)
-    assert means.shape == (22, 2, 4) and covs.shape == (22, 2, 4, 4) and n_eff.shape == (22, 2)
-    assert np.isfinite(means).all() and (n_eff > 1).all() and (n_eff <= 100.1).all()
+    assert means.shape == (22, 4, 4) and covs.shape == (22, 4, 4, 4) and n_eff.shape == (22, 4)
+    assert np.isfinite(means).all() and (n_eff > 1).all() and (n_eff <= 500.1).all()
 
 
 @pytest.mark.parametrize("measurement", MEASUREMENTS)
