@@ -85,7 +85,8 @@ def section(result: Result, heading: bool = True) -> str:
     parts += [_wrapped(result.text)] if result.text else []
     parts += [f"{table.title}:\n\n{markdown(table)}" for table in result.tables]
     if result.skipped:
-        parts.append("".join(_wrapped(f"Skipped: {name} ({reason}).") for name, reason in result.skipped.items()))
+        names = "; ".join(f"{name} ({reason})" for name, reason in result.skipped.items())
+        parts.append(_wrapped(f"Skipped: {names}."))
     parts += [f"![{plot.title}](performance_{plot.name}.svg)\n" for plot in result.plots]
     return "\n".join(parts)
 
