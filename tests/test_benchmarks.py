@@ -58,6 +58,11 @@ def test_c_without_fused_products_gives_the_kernels_bits(measurement, particles)
         np.testing.assert_array_equal(left, right)
 
 
+def test_fast_c_leaves_the_process_its_denormals():
+    skipping_absent(enter, "C, -ffast-math", Problem.draw("position", particles=32)).step()
+    assert np.full(3, 1e-310)[1] * 0.5 > 0.0
+
+
 def test_a_contestant_that_is_not_here_is_skipped_by_name(monkeypatch):
     monkeypatch.setitem(CONTESTANTS, "nobody", ("nobody", "Nobody"))
     figures, absent = agreement.check(["nobody"], "position")
