@@ -11,7 +11,7 @@ from collections.abc import Iterable
 import numpy as np
 from rich.console import Console
 
-from benchmarks.filters import CONTESTANTS, Absent, Problem, enter, kind_of
+from benchmarks.filters import CONTESTANTS, SLOW_STARTERS, Absent, Contestant, Looped, Problem, enter, kind_of
 from benchmarks.race import Claim, Options, Plot, Result, Table, Times, interleave, l2_bytes, main
 
 STRICT = "wsn_env, strict"
@@ -20,13 +20,15 @@ PLOT_PARTICLES = (500, 1500, 5000, 15_000, 50_000)
 LEAST = 5000  # particles in all rows: below, the call itself counts
 BYTES = 28  # a particle in a row: state, log weight, weight, ancestor
 WITHIN, BEYOND = 20.0, 35.0  # %
+RACED = [name for name in CONTESTANTS if name not in SLOW_STARTERS]
 SHORT_LIMIT = 50_000  # particles in all rows
-GRID_BYTES = 8 * 2**30  # of the largest clouds and their copies
+FEW = 64  # rows, up to which contestants have turns
 
 
 def measure(options: Options, console: Console) -> Result:
     """The grid and its line, then the two plots."""
     result = Result(name="filter_scaling", title="Scaling of the filter")
+    result.skipped = dict.fromkeys(SLOW_STARTERS, "compiles for seconds for every shape")
     grid = kernel_grid(options, console)
     a, b = fit(grid)
     deviations = {point: 100 * (seconds / (a + b * point[0] * point[1]) - 1) for point, seconds in grid.items()}
@@ -57,18 +59,15 @@ def measure(options: Options, console: Console) -> Result:
 
 
 def kernel_grid(options: Options, console: Console) -> dict[tuple[int, int], float]:
-    """Seconds a call by (P, B). One number of rows at a time, all P interleaved: the clouds would not all fit."""
-    grid = {}
-    for rows in ROWS:
-        console.print(f"filter kernel, {rows} rows", style="dim")
-        sizes = [p for p in PARTICLES if p * rows >= LEAST and 60 * p * rows <= GRID_BYTES]
-        if options.short:
-            sizes = [p for p in sizes if p * rows <= SHORT_LIMIT]
-        for part in ([p for p in sizes if p < 20_000], [p for p in sizes if p >= 20_000]):
-            contestants = {str(p): enter(STRICT, shared_cloud(p, rows)) for p in part}
-            times = interleave({p: contestant.step for p, contestant in contestants.items()}, options)
-            grid |= {(p, rows): times.median(str(p)) for p in part}
-    return grid
+    """Seconds a call by (P, B), all points interleaved; their clouds take 2.5 GB."""
+    points = [(p, rows) for rows in ROWS for p in PARTICLES if p * rows >= LEAST]
+    if options.short:
+        points = [(p, rows) for p, rows in points if p * rows <= SHORT_LIMIT]
+    console.print(f"filter kernel, {len(points)} sizes", style="dim")
+    contestants = {f"{p} x {rows}": enter(STRICT, shared_cloud(p, rows)) for p, rows in points}
+    calls = {name: contestant.step for name, contestant in contestants.items()}
+    times = interleave(calls, options, turn_s=options.turn_s / 2)
+    return {point: times.median(name) for point, name in zip(points, calls)}
 
 
 def shared_cloud(particles: int, rows: int) -> Problem:
@@ -114,7 +113,7 @@ def against_particles(options: Options, console: Console, result: Result) -> Lin
     lines: Lines = {}
     for p in sizes:
         console.print(f"every contestant, {p} particles", style="dim")
-        entered = _entered(CONTESTANTS, Problem.draw("position", p), result.skipped)
+        entered = _entered(RACED, Problem.draw("position", p), result.skipped)
         _extend(lines, p, interleave({name: contestant.step for name, contestant in entered.items()}, _few(options)))
     return lines
 
@@ -124,12 +123,12 @@ def against_rows(options: Options, console: Console) -> Lines:
     lines: Lines = {}
     for rows in ROWS[:3] if options.short else ROWS:
         console.print(f"every contestant, {rows} rows", style="dim")
-        names = [name for name in CONTESTANTS if not options.short or rows == 1 or _batches(name)]
         problem = shared_cloud(5000, rows)
-        for name in names:  # one in memory at a time: with many rows each has gigabytes
-            entered = _entered([name], problem, {})
-            calls = {name: contestant.step for name, contestant in entered.items()}
-            _extend(lines, rows, interleave(calls, _few(options)) if rows < 64 else _once(calls))
+        for name in RACED:  # one in memory at a time: with many rows some need gigabytes
+            for contestant in _entered([name], problem, {}).values():
+                once = options.short or rows >= FEW
+                times = _once(name, contestant) if once else interleave({name: contestant.step}, _few(options))
+                _extend(lines, rows, times)
     return lines
 
 
@@ -143,13 +142,6 @@ def _entered(names: Iterable[str], problem: Problem, skipped: dict[str, str]) ->
     return entered
 
 
-def _batches(name: str) -> bool:
-    try:
-        return kind_of(name).batches
-    except Absent:
-        return False
-
-
 def _extend(lines: Lines, x: int, times: Times) -> None:
     for name in times.seconds:
         lines.setdefault(name, []).append((x, times.median(name)))
@@ -160,9 +152,11 @@ def _few(options: Options) -> Options:
     return Options(min(options.rounds, 5), options.short)
 
 
-def _once(calls: dict) -> Times:
-    """A turn each: with as many rows it is long enough. The first calls (compilation, first touch) do not count."""
-    return interleave(calls, Options(rounds=1, short=True))
+def _once(name: str, contestant: Contestant) -> Times:
+    """One step: of many rows it is long enough. Batched contestants compile and touch their memory in a first one."""
+    if not isinstance(contestant, Looped):
+        contestant.step()
+    return interleave({name: contestant.step}, Options(rounds=1), turn_s=0.0, warm=False)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ With --short only positions.
 
 from rich.console import Console
 
-from benchmarks.filters import CONTESTANTS, Problem, enter, kind_of
+from benchmarks.filters import CONTESTANTS, SLOW_STARTERS, Problem, enter, kind_of
 from benchmarks.filters.agreement import check
 from benchmarks.race import Claim, Options, Result, Table, Times, figure, interleave, main
 
@@ -35,9 +35,11 @@ def measure(options: Options, console: Console) -> Result:
         " slowdown against the strict kernel in the same round (median, quartiles). Contestants without a batch form"
         f" have no figures at {ROWS} rows.",
     )
+    names = [name for name in CONTESTANTS if name not in SLOW_STARTERS or not options.short]
+    result.skipped |= {name: "a short run" for name in CONTESTANTS if name not in names}
     for measurement in list(MEASUREMENTS)[: 1 if options.short else None]:
         words = MEASUREMENTS[measurement]
-        checks, absent = check(CONTESTANTS, measurement)
+        checks, absent = check(names, measurement)
         result.skipped |= absent
         console.print(f"{words}: {len(checks)} contestants compute the same posterior")
         times = {rows: race(list(checks), measurement, rows, options) for rows in (1, ROWS)}
@@ -96,7 +98,7 @@ def _ratio(times: Times, name: str, ours: str, absent: dict[str, str]) -> tuple[
     """The ratio, or None and why not."""
     for one in (ours, name):
         if one not in times.seconds:
-            return None, absent[one]
+            return None, absent.get(one, f"no {one}")
     return times.ratio(name, ours), ""
 
 

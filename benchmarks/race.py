@@ -81,19 +81,21 @@ def interleave(
     units: dict[str, int] | None = None,
     clock: Callable[[], float] = time.process_time,
     turn_s: float | None = None,
+    warm: bool = True,
 ) -> Times:
     """Give every contestant a turn in every round.
 
     Args:
-        calls: by name, a function without arguments that has been warmed up by its maker or bears a first slow call.
+        calls: by name, a function without arguments.
         units: how many units of work a call is (rows, steps); 1 unless given.
         clock: CPU time of the process (for one thread), or time.perf_counter.
         turn_s: length of a turn; the options' unless given. A turn is at least one call.
+        warm: find out first how many calls make a turn; without, a turn is a single call.
     """
     units = units or {}
     turn_s = options.turn_s if turn_s is None else turn_s
-    repeats = {}
-    for name, call in calls.items():
+    repeats = dict.fromkeys(calls, 1)
+    for name, call in calls.items() if warm else ():
         call()
         repeats[name] = max(1, round(turn_s / max(_seconds(call, 2, clock), 1e-9)))
     seconds: dict[str, list[float]] = {name: [] for name in calls}
@@ -112,7 +114,7 @@ def _seconds(call: Callable[[], object], repeats: int, clock: Callable[[], float
 
 
 def pin_to_one_thread() -> None:
-    """One core; and BLAS, OpenMP and XLA, which read it when they are loaded, on one thread: starts the process anew."""
+    """One core; and BLAS, OpenMP and XLA, which read it when they are loaded, on one thread: starts it anew."""
     if any(os.environ.get(name) != value for name, value in ONE_THREAD.items()):
         os.environ.update(ONE_THREAD)
         os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])

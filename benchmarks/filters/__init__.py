@@ -23,8 +23,12 @@ CONTESTANTS = {
     "particles": ("particles_smc", "Particles"),
     "pfilter": ("pfilter_update", "PFilter"),
     "JAX, jit": ("jax_jit", "Jax"),
-    "torch, eager": ("torch_eager", "Torch"),
+    "torch, eager": ("torch_filter", "Torch"),
+    "torch, compiled": ("torch_filter", "Compiled"),
 }
+SLOW_STARTERS = frozenset(
+    {"torch, compiled"}
+)  # compile for seconds for every shape: short runs and grids leave them out
 
 
 def kind_of(name: str) -> type[Contestant]:

@@ -26,6 +26,7 @@ class Strict(Contestant):
         self.state = self.world.reset(problem.keys)
         self.state.reports.count[:] = MEMBERS
         self.state.reports.node[:] = np.arange(MEMBERS)
+        self.sensors, self.values = (np.moveaxis(a, 1, 0).copy() for a in (problem.sensors, problem.values))
         self.resampled = np.zeros(problem.rows, bool)
         super().__init__(problem)
 
@@ -40,9 +41,9 @@ class Strict(Contestant):
         """Period, nodes and reports into the state, and the tracker's step."""
         state = self.state
         state.period[:] = period + 1
-        state.network.positions[:] = self.problem.sensors[:, period]
-        state.reports.value[:] = self.problem.values[:, period]
-        self.world.tracker.correct(state.key, state.period, state.belief, state.network, state.reports, self.resampled)
+        state.network.positions[:] = self.sensors[period]
+        state.reports.value[:] = self.values[period]
+        self.world.tracker.correct(state.key, state.period.copy(), state.belief, state.network, state.reports, self.resampled)
         state.belief.predicted_mean[:] = state.belief.mean
 
     def estimate(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,0 +1,62 @@
+"""Every claim, one after the other in a process of its own, then docs/performance.md from their results.
+
+python -m benchmarks [--rounds N] [--short] [--folder FOLDER]
+"""
+
+import argparse
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from rich.console import Console
+
+from benchmarks import page
+from benchmarks.race import Result
+
+# Files of this folder; each is a claim, with the command line of race.main. In the order of running.
+CLAIMS = ("environment", "vector", "overhead", "nodes", "memory", "training", "filter_step", "filter_scaling")
+
+
+def main() -> int:
+    """Run, report, renew the page. Returns the exit code: 1 if a claim's process failed."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, help="turns of each contestant")
+    parser.add_argument("--short", action="store_true", help="a glance; leaves docs/performance.md as it is")
+    parser.add_argument("--folder", type=Path, default=page.RESULTS, help="where to put the results")
+    arguments = parser.parse_args()
+    options = ["--short"] * arguments.short + (["--rounds", str(arguments.rounds)] if arguments.rounds else [])
+    arguments.folder.mkdir(parents=True, exist_ok=True)
+    console = Console()
+    failed = []
+    for i, claim in enumerate(CLAIMS, start=1):
+        console.rule(f"{i}/{len(CLAIMS)} {claim}")
+        start = time.perf_counter()
+        if subprocess.run(command(claim, arguments.folder, options)).returncode:
+            failed.append(claim)
+        console.print(f"{claim}: {time.perf_counter() - start:.0f} s", style="dim")
+    missed = [
+        claim.what
+        for path in sorted(arguments.folder.glob("*.json"))
+        for claim in Result.load(path).claims
+        if claim.holds is False
+    ]
+    for what in missed:
+        console.print(f"missed: {what}")
+    for claim in failed:
+        console.print(f"failed: benchmarks.{claim}, see above", style="bold red")
+    if not arguments.short:
+        page.renew(arguments.folder)
+        console.print(f"renewed {page.PAGE}")
+    return 1 if failed else 0
+
+
+def command(claim: str, folder: Path, options: list[str]) -> list[str]:
+    """Its process."""
+    result = folder / f"{claim}.json"
+    result.unlink(missing_ok=True)  # a failing claim must not show an old figure
+    return [sys.executable, "-m", f"benchmarks.{claim}", "--json", str(result), *options]
+
+
+if __name__ == "__main__":
+    sys.exit(main())
