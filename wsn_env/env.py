@@ -77,8 +77,6 @@ class ClusterEnv(gym.Env):
             raise gym.error.ResetNeeded("call reset() before step()")
         if self._state.period.item() >= self.scenario.periods:
             raise gym.error.ResetNeeded(f"the episode ended after {self.scenario.periods} periods: call reset()")
-        if not self.action_space.contains(action):
-            raise ValueError(f"action {action!r} is not in {self.action_space}")
         cluster = self.interface.action.cluster(_batched(action), self._view)
         self._state, outcome = self.world.step(self._state, cluster, donate=True)
         reward, info = self._reward_and_info(outcome)

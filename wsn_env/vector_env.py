@@ -109,48 +109,53 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             keys[i] = draws.episode_key(self._generators[i])
         self._state, outcome = self.world.restart(self._state, rows, keys, donate=True)
         self._squares[rows] = 0.0
-        self._ended[rows] = False
+        self._ended = self._ended & ~rows
         return outcome
 
     def step(self, actions):
         """One period for every row; ended rows start anew as the autoreset mode says."""
         if self._state is None:
             raise gym.error.ResetNeeded("call reset() before step()")
-        anew = self._ended.copy()
-        if anew.any() and self.autoreset_mode == AutoresetMode.DISABLED:
+        anew = self._ended
+        begins = anew.any()
+        if begins and self.autoreset_mode == AutoresetMode.DISABLED:
             raise gym.error.ResetNeeded(
                 f"rows {np.flatnonzero(anew).tolist()} have ended: reset them with options={{'reset_mask': ...}}"
             )
-        cluster = self.interface.action.cluster(self._checked(actions), self._view)
+        cluster = self.interface.action.cluster(_stacked(actions), self._view)
         self._state, outcome = self.world.step(self._state, cluster, donate=True)
         reward, info = self._reward_and_info(outcome)
         self._squares += outcome.error_m * outcome.error_m
-        if anew.any():  # next-step mode: these rows only begin
+        if begins:  # next-step mode: these rows only begin
             reward[anew] = 0.0
             first = self._restart(anew)
             _overwrite(info, self._reward_and_info(first)[1], anew)
         truncated = self._state.period >= self.scenario.periods
         terminated = np.zeros(self.num_envs, dtype=bool)
-        ends = {"episode_rms_m": np.sqrt(self._squares / self.scenario.periods)}
-        if self.autoreset_mode == AutoresetMode.SAME_STEP and truncated.any():
-            return self._same_step(reward, terminated, truncated, info, ends)
+        ends = truncated.any()
+        if ends and self.autoreset_mode == AutoresetMode.SAME_STEP:
+            return self._same_step(reward, terminated, truncated, info)
         self._ended = truncated.copy()
-        infos = _masked(info, np.ones(self.num_envs, dtype=bool))
-        if truncated.any():
-            infos |= _masked(ends, truncated)
+        infos = _masked(info)
+        if ends:
+            infos |= _masked(self._episode_info(), truncated)
         return self._observe(), reward, terminated, truncated, infos
 
-    def _same_step(self, reward, terminated, truncated, info, ends):
+    def _episode_info(self) -> dict[str, np.ndarray]:
+        return {"episode_rms_m": np.sqrt(self._squares / self.scenario.periods)}
+
+    def _same_step(self, reward, terminated, truncated, info):
         """Begin the ended rows within the step; their last observation and info go to final_obs and final_info."""
         last = self._observe()
         final = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(truncated):
             final[i] = {name: value[i] for name, value in last.items()} if isinstance(last, dict) else last[i]
         infos = {"final_obs": final, "_final_obs": truncated.copy()}
-        infos |= {"final_info": _masked(info | ends, truncated), "_final_info": truncated.copy()}
+        infos["final_info"] = _masked(info | self._episode_info(), truncated)
+        infos["_final_info"] = truncated.copy()
         first = self._restart(truncated)
         _overwrite(info, self._reward_and_info(first)[1], truncated)
-        infos |= _masked(info, np.ones(self.num_envs, dtype=bool))
+        infos |= _masked(info)
         return self._observe(truncated), reward, terminated, truncated, infos
 
     @property
@@ -175,21 +180,6 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         reward = self.interface.reward(outcome.row, self._state.lam)
         return reward, measures(outcome.row, self._state.lam, reward)
 
-    def _checked(self, actions):
-        if isinstance(actions, (list, tuple)) and isinstance(actions[0], dict):  # as policies' predict() gives them
-            actions = {name: np.stack([one[name] for one in actions]) for name in actions[0]}
-        if isinstance(actions, dict):
-            actions = {name: np.asarray(value) for name, value in actions.items()}
-            valid = self.action_space.contains(actions)
-        else:  # the space's own `contains` takes half as long as all rows' physics
-            actions, space = np.asarray(actions), self.action_space
-            most = space.high if isinstance(space, gym.spaces.Box) else space.nvec - 1
-            valid = actions.shape == space.shape and actions.dtype.kind in "iu"
-            valid = valid and bool((actions >= 0).all() and (actions <= most).all())
-        if not valid:
-            raise ValueError(f"actions {actions!r} are not in {self.action_space}")
-        return actions
-
     def _observe(self, rows: np.ndarray | None = None):
         """The observation of all rows, of which only `rows` have changed since the last."""
         before, self._view = self._view, View.of(self._state)
@@ -200,14 +190,27 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         return self._last
 
 
-def _masked(info: dict[str, np.ndarray], rows: np.ndarray) -> dict[str, np.ndarray]:
-    """Gymnasium's form of a vector info: zeros where a row has none, and a mask under "_name"."""
-    out, everywhere, mask = {}, rows.all(), rows.copy()
+def _stacked(actions):
+    """A dict of arrays from a list of dicts, as policies' predict() gives them; anything else as it is."""
+    if isinstance(actions, (list, tuple, np.ndarray)) and len(actions) and isinstance(actions[0], dict):
+        return {name: np.stack([one[name] for one in actions]) for name in actions[0]}
+    return actions
+
+
+def _masked(info: dict[str, np.ndarray], rows: np.ndarray | None = None) -> dict[str, np.ndarray]:
+    """Gymnasium's form of a vector info: zeros where a row has none, and a mask under "_name".
+
+    Args:
+        rows: (B,) bool, who has one; None: all have, and their arrays are taken as they are.
+    """
+    if rows is None:
+        mask = np.ones(len(info["error_m"]), dtype=bool)
+        return info | {f"_{name}": mask for name in info}
+    out = {}
     for name, value in info.items():
         out[name] = value.copy()
-        if not everywhere:
-            out[name][~rows] = 0
-        out[f"_{name}"] = mask
+        out[name][~rows] = 0
+        out[f"_{name}"] = rows.copy()
     return out
 
 

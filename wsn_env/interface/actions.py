@@ -1,4 +1,5 @@
-"""Action spaces and their translation into a Cluster. Each takes (B, ...) actions and a View."""
+"""Action spaces and their translation into a Cluster. Each takes (B, ...) actions and a View, and refuses with a
+ValueError what is not in its space: NumPy's and Gymnasium's own checks would take longer than the translation."""
 
 from __future__ import annotations
 
@@ -29,10 +30,12 @@ class MenuAction:
 
     def cluster(self, action, view: View) -> Cluster:
         """The cluster that the menu's entries name."""
-        actions = np.ascontiguousarray(action, dtype=np.int64).reshape(-1)
+        rows = len(view.row)
+        actions = np.ascontiguousarray(_whole_numbers(action, self.space, rows), np.int64)
         nodes = self._ordered(actions, view)
-        heads, members = np.empty(len(actions), np.int64), np.empty((len(actions), MENU_MEMBERS + 1), np.int32)
-        _read_menu(0, len(actions), actions, nodes, view.network.row, heads, members)
+        heads, members = np.empty(rows, np.int64), np.empty((rows, MENU_MEMBERS + 1), np.int32)
+        if _read_menu(0, rows, actions, nodes, view.network.row, heads, members):
+            raise _refusal(action, self.space)
         return Cluster(heads, members)
 
     def _ordered(self, actions, view: View) -> np.ndarray:
@@ -63,8 +66,13 @@ def _moves(action, head):
 
 @lean_kernel
 def _read_menu(start, stop, actions, nodes, standing, heads, members):
-    """Fill heads (B,) and members (B, M) from the menu's entries and the candidates in order of merit."""
+    """Fill heads (B,) and members (B, M) from the menu's entries and the candidates in order of merit.
+
+    Returns: how many actions are not in the menu.
+    """
+    strange = 0
     for b in range(start, stop):
+        strange += actions[b] < 0 or actions[b] > 2 * (MENU_MEMBERS + 1)
         head = standing[b].head
         members[b] = -1
         if actions[b] == 0 and head >= 0:
@@ -82,6 +90,7 @@ def _read_menu(start, stop, actions, nodes, standing, heads, members):
                 members[b, slot] = node
                 slot += 1
                 left -= 1
+    return strange
 
 
 class SubsetAction:
@@ -93,7 +102,7 @@ class SubsetAction:
 
     def cluster(self, action, view: View) -> Cluster:
         """The cluster that the entries name."""
-        action = np.asarray(action).reshape(len(view.period), -1)
+        action = _in_range(action, self.space, len(view.row))
         nodes = view.nearest(self._candidates)[0]
         named = np.take_along_axis(nodes, np.maximum(action[:, :1] - 1, 0), axis=1)[:, 0]
         head = np.where(action[:, 0] == 0, view.head, named)
@@ -116,7 +125,7 @@ class NodesAction:
 
     def cluster(self, action, view: View) -> Cluster:
         """The cluster of the chosen nodes."""
-        chosen = np.asarray(action).reshape(len(view.period), -1) == 1
+        chosen = _in_range(action, self.space, len(view.row)) == 1
         living = chosen & view.alive
         distance = np.where(living, view.distance, np.inf)
         head = np.where(living.any(axis=1), distance.argmin(axis=1), view.nearest_living())
@@ -136,15 +145,36 @@ class ClusterAction:
 
     def cluster(self, action, view: View) -> Cluster:
         """The choice itself."""
-        rows = len(view.period)
-        return Cluster.of(
-            np.asarray(action["head"]).reshape(rows), np.asarray(action["members"]).reshape(rows, -1) == 1
-        )
+        if not isinstance(action, dict) or action.keys() != self.space.spaces.keys():
+            raise _refusal(action, self.space)
+        head, members = (_in_range(action[name], self.space[name], len(view.row)) for name in ("head", "members"))
+        return Cluster.of(head, members == 1)
 
     def masks(self, view: View) -> np.ndarray:
         """(B, S + 2 S) bool: heads, then out/in for each node."""
         choice = np.stack([np.ones_like(view.alive), view.alive], axis=2).reshape(len(view.period), -1)
         return np.concatenate([view.alive, choice], axis=1)
+
+
+def _whole_numbers(action, space, rows: int) -> np.ndarray:
+    """The actions as an array (rows, ...) of integers."""
+    array = np.asarray(action)
+    if array.dtype.kind not in "iu" or array.shape != (rows, *space.shape):
+        raise _refusal(action, space)
+    return array
+
+
+def _in_range(action, space, rows: int) -> np.ndarray:
+    """The actions as an array, if they are in the space."""
+    array = _whole_numbers(action, space, rows)
+    most = space.n - 1 if isinstance(space, spaces.Discrete) else space.nvec - 1
+    if (array < 0).any() or (array > most).any():
+        raise _refusal(action, space)
+    return array
+
+
+def _refusal(action, space) -> ValueError:
+    return ValueError(f"action {action!r} is not in {space}, one for each row")
 
 
 ACTIONS = {"menu": MenuAction, "subset": SubsetAction, "nodes": NodesAction, "cluster": ClusterAction}
