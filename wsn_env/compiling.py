@@ -29,6 +29,7 @@ FAST = {"reassoc", "contract", "arcp", "nsz"}  # not nnan, ninf: infinities and 
 piece = numba.njit(error_model="numpy", nogil=True, fastmath=False, _nrt=True)
 inline_piece = numba.njit(error_model="numpy", nogil=True, fastmath=False, _nrt=True, forceinline=True)  # in long loops
 lean_piece = numba.njit(error_model="numpy", nogil=True, fastmath=False, _nrt=False)
+spliced = numba.njit(error_model="numpy", nogil=True, fastmath=False, _nrt=False, inline="always")  # may return arrays
 
 
 def kernel(function):

@@ -7,12 +7,14 @@ from wsn_env.compiling import kernel, lean_kernel, lean_piece
 from wsn_env.physics import radio, sensing
 from wsn_env.physics.field import nearest_living, squared_distance
 from wsn_env.trackers.kernels import filter_row, scratch
-from wsn_env.types import KEEP_CLUSTER, KEEP_HEAD
+from wsn_env.types import KEEP_CLUSTER, KEEP_HEAD, Outcome, state_of
 
 
 @kernel
-def run(start, stop, cs, heads, chosen, lost, state, outcome):
+def run(start, stop, cs, heads, chosen, lost, outcomes, *arrays):
     """A period with the particle filter at the head, up to where some rows must search; returns how many."""
+    state = state_of(arrays)
+    outcome = Outcome(outcomes, state.ledger.spent_j)
     room = scratch(state.belief.particles.shape[2])
     count = 0
     for b in range(start, stop):

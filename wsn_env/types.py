@@ -3,6 +3,9 @@
 They are NamedTuples of arrays, so that compiled kernels take them as they are. Handing one over costs by the number
 of arrays, so all that is a number or a small matrix a row shares one structured array, `row` (B,). Its fields read as
 attributes: `belief.mean` is `belief.row["mean"]`, (B, 4); kernels write `belief.row[b].mean`.
+
+Nested tuples cost five times as much as their arrays one after the other. The two kernels that run in every period take
+them so, as `arrays()` gives them, and put them together again inside with `state_of` and `network_of`.
 """
 
 from __future__ import annotations
@@ -10,6 +13,8 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol
 
 import numpy as np
+
+from wsn_env.compiling import spliced
 
 
 def _of_row(self, name: str) -> np.ndarray:
@@ -90,6 +95,16 @@ class Network(NamedTuple):
 
     __getattr__ = _of_row
 
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """One after the other."""
+        return *self[:4], *self.grid
+
+
+@spliced
+def network_of(arrays):
+    """The network whose `arrays()` they are."""
+    return Network(arrays[0], arrays[1], arrays[2], arrays[3], Grid(*arrays[4:7]))
+
 
 class Ledger(NamedTuple):
     """Who paid in the last period."""
@@ -155,6 +170,19 @@ class State(NamedTuple):
     def copy(self) -> State:
         """A deep copy: no array is shared."""
         return _copied(self)
+
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """One after the other."""
+        return self.key, self.track, self.row, *self.network.arrays(), *self.ledger, *self.reports, *self.belief
+
+
+@spliced
+def state_of(arrays):
+    """The state whose `arrays()` they are."""
+    network, ledger, reports, belief = arrays[3:10], arrays[10:13], arrays[13:16], arrays[16:19]
+    return State(
+        arrays[0], arrays[1], arrays[2], network_of(network), Ledger(*ledger), Reports(*reports), Belief(*belief)
+    )
 
 
 def _copied(value):

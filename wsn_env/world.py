@@ -88,7 +88,7 @@ class World:
         heads, members = _choice(cluster, state)
         lost = np.zeros(state.rows, bool)
         if isinstance(self.tracker, ParticleTracker):
-            n_lost = self._over_rows(self._run, heads, members, lost, state, outcome)
+            n_lost = self._over_rows(self._run, heads, members, lost, outcome.row, *state.arrays())
         else:
             # Handover and invitations, the target moves, members sense and report.
             self._over_rows(period.sense_and_report, heads, members, state, outcome)

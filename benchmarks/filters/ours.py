@@ -43,7 +43,9 @@ class Strict(Contestant):
         state.period[:] = period + 1
         state.network.positions[:] = self.sensors[period]
         state.reports.value[:] = self.values[period]
-        self.world.tracker.correct(state.key, state.period.copy(), state.belief, state.network, state.reports, self.resampled)
+        self.world.tracker.correct(
+            state.key, state.period.copy(), state.belief, state.network, state.reports, self.resampled
+        )
         state.belief.predicted_mean[:] = state.belief.mean
 
     def estimate(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

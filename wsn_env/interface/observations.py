@@ -13,6 +13,7 @@ from wsn_env.physics.field import nearest_candidates, squared_distance
 from wsn_env.physics.sensing import detection_piece
 from wsn_env.quantity import suggest
 from wsn_env.scenario import Scenario
+from wsn_env.types import network_of
 from wsn_env.view import View
 
 BELIEF_FEATURES = (
@@ -51,10 +52,10 @@ BOUND = 10.0
 
 
 @lean_kernel
-def _encode(start, stop, cs, battery_j, which, rows, beliefs, network, reports, nodes, distances, out):
+def _encode(start, stop, cs, battery_j, which, nodes, distances, out, rows, beliefs, count, *network_arrays):
     """Fill out (B, n): BELIEF_FEATURES, then CANDIDATE_FEATURES of each candidate; and the candidates (B, K). Only in
     the rows marked in `which`."""
-    c = cs[0]
+    c, network = cs[0], network_of(network_arrays)
     size, width = len(BELIEF_FEATURES), len(CANDIDATE_FEATURES)
     for b in range(start, stop):
         if not which[b]:
@@ -67,7 +68,7 @@ def _encode(start, stop, cs, battery_j, which, rows, beliefs, network, reports, 
         f[0] = 0.5 * log(max(rows[b].lam, 1e-3))
         ex, ey = _encode_ellipse(m, p, c, f)
         f[9] = 0.2 * rows[b].log_miss
-        f[10] = 0.25 * reports.count[b]
+        f[10] = 0.25 * count[b]
         if head >= 0:
             _encode_head(head, head == nodes[b, 0], members, n, positions, m, p, ex, ey, c, f)
         f[18] = distances[b, -1] / c.radius_m
@@ -167,8 +168,9 @@ class CandidatesObservation:
         return self._fill(last.copy(), view, rows)
 
     def _fill(self, out, view: View, rows):
-        seen = (rows, view.row, view.belief, view.network, view.reports, *view.nearest(self.shape[0]))
-        over_rows(_encode, len(rows), self._threads, self._constants, self._battery_j, *seen, out)
+        filled, seen = (*view.nearest(self.shape[0]), out), (view.row, view.belief, view.reports.count)
+        numbers = self._constants, self._battery_j
+        over_rows(_encode, len(rows), self._threads, *numbers, rows, *filled, *seen, *view.network.arrays())
         return out
 
 
