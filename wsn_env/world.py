@@ -87,15 +87,14 @@ class World:
         outcome = _nothing_yet(state)
         heads, members = _choice(cluster, state)
         lost = np.zeros(state.rows, bool)
-        if isinstance(self.tracker, ParticleTracker):
+        # Handover and invitations; the target moves; members sense and report; the head predicts and corrects;
+        # broadcast, costs, and the prediction for the next period, unless a row must search first.
+        if isinstance(self.tracker, ParticleTracker):  # all in one compiled call
             n_lost = self._over_rows(self._run, heads, members, lost, outcome.row, *state.arrays())
         else:
-            # Handover and invitations, the target moves, members sense and report.
             self._over_rows(period.sense_and_report, heads, members, state, outcome)
-            # The head predicts and corrects.
             resampled = np.zeros(state.rows, bool)
             self.tracker.correct(state.key, state.period.copy(), state.belief, state.network, state.reports, resampled)
-            # Broadcast, costs, and the prediction for the next period; first a search where the track is probably lost.
             n_lost = self._over_rows(period.conclude, resampled, lost, state, outcome)
         if n_lost:
             self._search(lost, state, outcome)
