@@ -89,8 +89,8 @@ class Training:
     """Units of the two hidden layers."""
     seed: int = 0
     """Of training, below 2^31 - steps - rows; evaluation seeds lie above."""
-    torch_threads: int = 1
-    """Cores for PPO's updates; more is slower as soon as anything else runs."""
+    torch_threads: int = 2
+    """Cores for PPO's updates; another number trains another policy, since sums are split otherwise."""
     checkpoint_steps: int = 500_000
     """Periods between checkpoints."""
 
@@ -132,7 +132,7 @@ def train(settings: Training) -> None:
     model = make_model(settings, VecMonitor(adapted), folder)
     left = settings.steps - model.num_timesteps
     if left > 0:
-        started = time.perf_counter()
+        started, busy = time.perf_counter(), time.process_time()
         model.set_logger(configure(str(folder / f"progress-{model.num_timesteps}"), ["tensorboard", "csv"]))
         with progress_bar() as report:
             callback = Watch(settings, folder, report)
@@ -143,7 +143,8 @@ def train(settings: Training) -> None:
         seconds = time.perf_counter() - started
         print(
             f"trained {left:,} periods in {seconds:.0f} s ({left / seconds:,.0f} a second), "
-            f"{100 * adapted.seconds / seconds:.0f} % of it in the environment"
+            f"{100 * adapted.seconds / seconds:.0f} % of it in the environment, "
+            f"{(time.process_time() - busy) / seconds:.1f} cores busy"
         )
 
     facts = {"training": plain(settings), "scenario": scenario.as_dict(), "versions": versions()}
@@ -177,7 +178,7 @@ def open_folder(settings: Training) -> Path:
         if not settings.resume:
             raise ValueError(f"{folder} exists: --resume continues it, --name begins another, or remove it")
         old, new = json.loads(path.read_text()), plain(settings)
-        free = {"resume", "runs", "episodes", "evaluation_seed", "torch_threads", "checkpoint_steps"}
+        free = {"resume", "runs", "episodes", "evaluation_seed", "checkpoint_steps"}
         differing = [name for name in new if name not in free and old.get(name) != new[name]]
         if differing:
             name = differing[0]
