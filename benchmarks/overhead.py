@@ -47,7 +47,7 @@ def measure(options: Options, console: Console, **overrides) -> Result:
         f" without resets, of which {100 * episode.record.searches / rows / periods:.1f} % of the steps search. The"
         " period beside the filter is World.step less the filter: the target, sensing, radio, batteries, searches."
         " The rest is checks, reward, info and the loop.",
-        claims=[Claim(f"share of a step beside the filter, {rows} rows", AT_MOST, share, "%", at_most=True)],
+        claims=[Claim("vector environment: share of a step beside the filter", AT_MOST, share, "%", at_most=True)],
         tables=[table(times)],
         figures={"seconds": times.seconds},
         packages=["gymnasium"],

@@ -52,7 +52,7 @@ def measure(options: Options, console: Console) -> Result:
         title="Training",
         text=f"train.py, {'a small form of it' if options.short else f'default settings, {ROLLOUTS} rollouts'}:"
         f" {figure(speed)} periods/s. Wall clock.",
-        claims=[Claim("share of train.py's wall time in the environment", AT_MOST, environment, "%", at_most=True)],
+        claims=[Claim("train.py: share of its wall time in the environment", AT_MOST, environment, "%", at_most=True)],
         tables=[Table("Where a training spends its time", ["part", "% of wall time", "range over runs"], lines)],
         figures={"runs": runs},
         packages=["torch", "stable-baselines3"],

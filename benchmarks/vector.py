@@ -45,7 +45,9 @@ def measure(options: Options, console: Console) -> Result:
             console.print(f"P = {particles}: both give the same bits for {steps} steps, resets among them")
             times = race(particles, ROWS, options)
             result.claims.append(
-                Claim(f"native over SyncVectorEnv, {ROWS} rows, P = {particles}", target, times.ratio(SYNC, NATIVE))
+                Claim(
+                    f"vector environment: speed over SyncVectorEnv, P = {particles}", target, times.ratio(SYNC, NATIVE)
+                )
             )
             result.figures[str(particles)] = times.seconds
             low, high = times.spread(SYNC, NATIVE)
