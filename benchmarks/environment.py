@@ -41,7 +41,7 @@ LABELS = {
 
 def measure(options: Options, console: Console) -> Result:
     """Check, then race."""
-    agreement, _ = check(["NumPy f64, textbook", "filterpy's book"], "position")
+    agreement, _ = check(["NumPy f64, textbook", "filterpy's book"], "position", options.short)
     differences = episode_differences(*((8, 32, 500) if options.short else (24, 96, 1000)))
     if max(map(abs, differences.values())) > STANDARD_ERRORS:
         raise SystemExit(f"the naive environment has other episodes: {differences} standard errors")

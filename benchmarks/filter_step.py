@@ -38,7 +38,7 @@ def measure(options: Options, console: Console) -> Result:
     result.skipped |= {name: "a short run" for name in CONTESTANTS if name not in names}
     for measurement in list(MEASUREMENTS)[: 1 if options.short else None]:
         words = MEASUREMENTS[measurement]
-        checks, absent = check(names, measurement)
+        checks, absent = check(names, measurement, options.short)
         result.skipped |= absent
         console.print(f"{words}: {len(checks)} contestants compute the same posterior")
         times = {rows: race(list(checks), measurement, rows, options) for rows in (1, ROWS)}

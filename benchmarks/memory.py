@@ -43,7 +43,7 @@ def measure(options: Options, console: Console) -> Result:
         f" scratch of its one thread, {figure(scratch_bytes(10**6) / 1e6)} P bytes.",
     )
     lines = []
-    for particles, nodes in SIZES:
+    for particles, nodes in SIZES[: 1 if options.short else None]:
         console.print(f"memory, {particles} particles, {nodes} nodes", style="dim")
         size = f"P = {particles:,}, S = {nodes:,}"
         basis = 24 * particles + 64 * nodes

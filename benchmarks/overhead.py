@@ -25,6 +25,7 @@ from wsn_env.vector_env import ClusterVectorEnv
 from wsn_env.view import View
 
 SEED = 0
+SHORT = {"periods": 30}
 AT_MOST = 25.0  # % of a step
 STEP, FILTER = "step", "filter"
 PARTS = ("action", "world", "observation")  # of a step, each timed alone
@@ -32,7 +33,7 @@ PARTS = ("action", "world", "observation")  # of a step, each timed alone
 
 def measure(options: Options, console: Console, **overrides) -> Result:
     """Record, check, race. The overrides are the scenario's."""
-    episode = Episode(**overrides)
+    episode = Episode(**(SHORT if options.short else {}) | overrides)
     console.print(f"replayed filter: same beliefs and decisions in {len(episode.record.corrections)} periods")
     names = (STEP, FILTER, *PARTS)
     calls = {name: (lambda name=name: episode.play(name)) for name in names}
