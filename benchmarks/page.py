@@ -101,7 +101,8 @@ def targets(results: list[Result]) -> str:
         for claim in result.claims:
             lines.setdefault((claim.what, claim.target), []).append(claim)
     return markdown(
-        Table("", ["claim", "target", "measured", "worst case of", "verdict"], [_line(each) for each in lines.values()])
+        Table("", ["claim", "target", "measured", "worst case", "verdict"], [_line(each) for each in lines.values()]),
+        left=(0, 3, 4),
     )
 
 
@@ -115,7 +116,9 @@ def _line(claims: list[Claim]) -> list[str]:
     what, target, value, verdict = replace(worst, case="").cells()
     if missing := len(claims) - len(measured):
         verdict += f", {missing} not measured"
-    cases = f"{len(measured)}, best {best.written(best.measured)}: {worst.case}" if len(measured) > 1 else worst.case
+    cases = (
+        f"{worst.case} (best of {len(measured)}: {best.written(best.measured)})" if len(measured) > 1 else worst.case
+    )
     return [what, target, value, cases, f"**{verdict}**" if worst.holds is False else verdict]
 
 
@@ -140,9 +143,9 @@ def _wrapped(text: str) -> str:
     return textwrap.fill(text, WIDTH, break_on_hyphens=False) + "\n"
 
 
-def markdown(table: Table) -> str:
-    """The first column to the left, the others to the right."""
-    rules = ["---", *["--:"] * (len(table.columns) - 1)]
+def markdown(table: Table, left: tuple[int, ...] = (0,)) -> str:
+    """These columns to the left, the others to the right."""
+    rules = ["---" if i in left else "--:" for i in range(len(table.columns))]
     lines = [table.columns, rules, *table.rows]
     return "".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |\n" for line in lines)
 

@@ -177,7 +177,7 @@ def test_a_short_run_becomes_a_page_that_renews_itself(claim, few, tmp_path):
 def test_claims_that_differ_in_their_case_are_one_line_with_the_worst():
     cases = [race.Claim("faster", 5.0, value, case=case) for case, value in {"a": 7.0, "b": 4.0, "c": None}.items()]
     table = page.targets([race.Result("speed", "Speed", claims=[*cases, race.Claim("flat", 2.0, 1.0, at_most=True)])])
-    assert "| faster | >= 5x | 4x | 2, best 7x: b | **missed, 1 not measured** |\n| flat | <= 2x | 1x |" in table
+    assert "| faster | >= 5x | 4x | b (best of 2: 7x) | **missed, 1 not measured** |\n| flat | <= 2x | 1x |" in table
 
 
 def test_the_page_has_a_place_for_every_claim():
