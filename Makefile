@@ -8,7 +8,7 @@ VENV := .venv
 RUN := $(VENV)/bin/python
 READY := $(VENV)/.ready
 
-.PHONY: train test slow bench lint clean
+.PHONY: train test slow bench bench-short lint clean
 
 train: $(READY)
 	$(RUN) train.py --resume --lam $(LAM)
@@ -23,6 +23,10 @@ slow: $(READY)
 # Every claim about speed against its peers, some ten minutes; renews docs/performance.md.
 bench: $(VENV)/.bench
 	$(RUN) -m benchmarks
+
+# A glance at the same claims, a minute, with the peers that are there; docs/performance.md stays.
+bench-short: $(READY)
+	$(RUN) -m benchmarks --short
 
 $(VENV)/.bench: $(READY)
 	$(RUN) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[test,bench]"

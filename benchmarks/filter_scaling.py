@@ -18,7 +18,7 @@ STRICT = "wsn_env, strict"
 PARTICLES, ROWS = (500, 1000, 2000, 5000, 10_000, 20_000, 50_000), (1, 4, 16, 64, 256, 1024)
 PLOT_PARTICLES = (500, 1500, 5000, 15_000, 50_000)
 LEAST = 5000  # particles in all rows: below, the call itself counts
-BYTES = 28  # a particle in a row: state, log weight, weight, ancestor
+BYTES = 68  # a particle in a row: state and log weight; weight, 3 slots and 2 states of scratch
 WITHIN, BEYOND = 20.0, 35.0  # %
 RACED = [name for name in CONTESTANTS if name not in SLOW_STARTERS]
 SHORT_LIMIT = 50_000  # particles in all rows
@@ -41,7 +41,7 @@ def measure(options: Options, console: Console) -> Result:
     result.tables.append(table(grid, deviations))
     for where, points, target in (("within", inside, WITHIN), ("beyond", outside, BEYOND)):
         measured = max(map(abs, points.values()), default=None)
-        what = f"filter kernel: distance from a + b P B, working set {where} L2"
+        what = f"filter kernel: distance from a + b P B, a row's working set {where} L2"
         result.claims.append(Claim(what, target, measured, "%", at_most=True, why="no such point"))
     by_particles, by_rows = against_particles(options, console, result), against_rows(options, console)
     result.plots = [

@@ -16,8 +16,9 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from benchmarks.race import Claim, Options, Result, Table, main
+from benchmarks.race import Claim, Options, Result, Table, figure, main
 from wsn_env.scenario import Scenario
+from wsn_env.trackers.kernels import scratch
 from wsn_env.types import Cluster, State
 from wsn_env.world import World
 
@@ -39,10 +40,10 @@ def measure(options: Options, console: Console) -> Result:
         title="Memory of a row",
         text=f"Bytes a row of {ID}: the state's arrays, of which the track (101 periods of 4 numbers) grows with"
         f" neither particles nor nodes; and the growth of a process that steps {rows} rows with donate=True, less the"
-        " scratch of its one thread, which is 8 P + 4 bytes.",
+        f" scratch of its one thread, {figure(scratch_bytes(10**6) / 1e6)} P bytes.",
     )
     lines = []
-    for particles, nodes in SIZES:
+    for particles, nodes in SIZES[: 1 if options.short else None]:
         console.print(f"memory, {particles} particles, {nodes} nodes", style="dim")
         size = f"P = {particles:,}, S = {nodes:,}"
         basis = 24 * particles + 64 * nodes
@@ -51,8 +52,15 @@ def measure(options: Options, console: Console) -> Result:
         grown, why = growth(particles, nodes, rows)
         resident = None if grown is None else (grown - scratch_bytes(particles)) / rows
         result.claims += [
-            Claim(f"{name} over 24 P + 64 S, {size}", AT_MOST, value and value / basis, at_most=True, why=why)
-            for name, value in (("arrays of a row", total), ("resident memory of a row", resident))
+            Claim(
+                "memory of a row over 24 P + 64 S bytes",
+                AT_MOST,
+                value and value / basis,
+                at_most=True,
+                why=why,
+                case=f"{name}, {size}",
+            )
+            for name, value in (("arrays", total), ("resident", resident))
         ]
         cells = [f"{value:,}" for value in (*counted.values(), total)]
         lines.append([f"{particles:,}", f"{nodes:,}", *cells, "" if resident is None else f"{resident:,.0f}"])
@@ -73,8 +81,8 @@ def _bytes(value) -> int:
 
 
 def scratch_bytes(particles: int) -> int:
-    """Of a thread: weights and ancestors."""
-    return 4 * particles + 4 * (particles + 1)
+    """Of a thread's filter."""
+    return sum(array.nbytes for array in scratch.py_func(particles))
 
 
 def growth(particles: int, nodes: int, rows: int) -> tuple[int | None, str]:

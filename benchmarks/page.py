@@ -2,8 +2,8 @@
 
     python -m benchmarks.page [FOLDER]
 
-Markers are `<!-- begin NAME -->` and `<!-- end NAME -->`: `machine`, `targets`, one for any claim by its name, and
-`further` for the claims without their own.
+Markers are `<!-- begin NAME -->` and `<!-- end NAME -->`: `machine`, `targets`, one for any claim by its name,
+`further` for the claims without their own, and `plots` for those with every contestant.
 """
 
 from __future__ import annotations
@@ -11,29 +11,48 @@ from __future__ import annotations
 import argparse
 import re
 import textwrap
+from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.plots import draw
-from benchmarks.race import Result, Table
+from benchmarks.race import Claim, Plot, Result, Table
 from wsn_env.files import replacing
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "performance.md"
 RESULTS = ROOT / "benchmarks" / "results"
+ORDER = ("filter_step", "environment", "vector", "overhead", "training", "filter_scaling", "nodes", "memory")
+EVERY_CONTESTANT = ("particles", "rows")  # plots that stand together, at the end
+ENVIRONMENTS = "env_rows"  # joins the second of them
+WIDTH = 128
 MARKED = re.compile(r"(<!-- begin (\w+) -->\n).*?(<!-- end \2 -->)", flags=re.DOTALL)
 
 
 def renew(folder: Path = RESULTS, page: Path = PAGE) -> None:
     """Write the plots beside the page, and the page anew."""
-    results = [Result.load(path) for path in sorted(folder.glob("*.json"))]
+    results = sorted((Result.load(path) for path in folder.glob("*.json")), key=_place)
     if not results:
         raise SystemExit(f"no results in {folder}: run python -m benchmarks")
-    for result in results:
-        for plot in result.plots:
-            draw(plot, page.with_name(f"performance_{plot.name}.svg"))
+    for plot in plots(results).values():
+        draw(plot, page.with_name(f"performance_{plot.name}.svg"))
     text = rendered(page.read_text(), results)
     with replacing(page) as temporary:
         temporary.write_text(text)
+
+
+def _place(result: Result) -> tuple[int, str]:
+    return ORDER.index(result.name) if result.name in ORDER else len(ORDER), result.name
+
+
+def plots(results: list[Result]) -> dict[str, Plot]:
+    """By name; the steps of whole environments are lines beside those of filters."""
+    found = {plot.name: plot for result in results for plot in result.plots}
+    if "rows" in found and ENVIRONMENTS in found:
+        lines = {f"environment: {name}": line for name, line in found.pop(ENVIRONMENTS).lines.items()}
+        rows = found["rows"]
+        title = f"{rows.title}; steps/s of whole environments"
+        found["rows"] = replace(rows, title=title, y="steps/s", lines=rows.lines | lines)
+    return found
 
 
 def rendered(text: str, results: list[Result]) -> str:
@@ -41,6 +60,8 @@ def rendered(text: str, results: list[Result]) -> str:
     own = {name for _, name, _ in MARKED.findall(text)}
     blocks = {"machine": machine(results), "targets": targets(results)}
     blocks |= {result.name: section(result, heading=False) for result in results}
+    drawn = plots(results)
+    blocks["plots"] = "\n".join(_image(drawn[name]) for name in EVERY_CONTESTANT if name in drawn)
     blocks["further"] = "\n".join(section(result) for result in results if result.name not in own)
     if "further" not in own and blocks["further"]:
         raise SystemExit(f"{PAGE.name} has no place for further claims: add <!-- begin further --> and its end")
@@ -74,9 +95,31 @@ def _distinct(machines: list[dict]) -> list[dict]:
 
 
 def targets(results: list[Result]) -> str:
-    """All claims in a table."""
-    rows = [claim.cells() for result in results for claim in result.claims]
-    return markdown(Table("", ["claim", "target", "measured", "verdict"], rows))
+    """All claims in a table: a line for those that differ in their case only, with the worst of them."""
+    lines: dict[tuple, list[Claim]] = {}
+    for result in results:
+        for claim in result.claims:
+            lines.setdefault((claim.what, claim.target), []).append(claim)
+    return markdown(
+        Table("", ["claim", "target", "measured", "worst case", "verdict"], [_line(each) for each in lines.values()]),
+        left=(0, 3, 4),
+    )
+
+
+def _line(claims: list[Claim]) -> list[str]:
+    measured = [claim for claim in claims if claim.measured is not None]
+    if not measured:
+        what, *_, verdict = replace(claims[0], case="").cells()
+        return [what, claims[0].cells()[1], "", "", verdict]
+    pick = (max, min) if claims[0].at_most else (min, max)
+    worst, best = (choose(measured, key=lambda claim: claim.measured) for choose in pick)
+    what, target, value, verdict = replace(worst, case="").cells()
+    if missing := len(claims) - len(measured):
+        verdict += f", {missing} not measured"
+    cases = (
+        f"{worst.case} (best of {len(measured)}: {best.written(best.measured)})" if len(measured) > 1 else worst.case
+    )
+    return [what, target, value, cases, f"**{verdict}**" if worst.holds is False else verdict]
 
 
 def section(result: Result, heading: bool = True) -> str:
@@ -87,17 +130,22 @@ def section(result: Result, heading: bool = True) -> str:
     if result.skipped:
         names = "; ".join(f"{name} ({reason})" for name, reason in result.skipped.items())
         parts.append(_wrapped(f"Skipped: {names}."))
-    parts += [f"![{plot.title}](performance_{plot.name}.svg)\n" for plot in result.plots]
+    elsewhere = (*EVERY_CONTESTANT, ENVIRONMENTS)
+    parts += [_image(plot) for plot in result.plots if plot.name not in elsewhere]
     return "\n".join(parts)
 
 
+def _image(plot: Plot) -> str:
+    return f"![{plot.title}](performance_{plot.name}.svg)\n"
+
+
 def _wrapped(text: str) -> str:
-    return textwrap.fill(text, 120, break_on_hyphens=False) + "\n"
+    return textwrap.fill(text, WIDTH, break_on_hyphens=False) + "\n"
 
 
-def markdown(table: Table) -> str:
-    """The first column to the left, the others to the right."""
-    rules = ["---", *["--:"] * (len(table.columns) - 1)]
+def markdown(table: Table, left: tuple[int, ...] = (0,)) -> str:
+    """These columns to the left, the others to the right."""
+    rules = ["---" if i in left else "--:" for i in range(len(table.columns))]
     lines = [table.columns, rules, *table.rows]
     return "".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |\n" for line in lines)
 

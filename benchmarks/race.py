@@ -135,6 +135,7 @@ class Claim:
     unit: str = "x"  # or "%"
     at_most: bool = False  # the target is an upper bound
     why: str = ""  # it could not be measured
+    case: str = ""  # claims that differ in their case only are one line of the page
 
     @property
     def holds(self) -> bool | None:
@@ -151,12 +152,13 @@ class Claim:
     def cells(self) -> list[str]:
         """What, target, measured, verdict."""
         sign = "<=" if self.at_most else ">="
-        measured = "" if self.measured is None else f"{figure(self.measured)}{self._suffix}"
-        return [self.what, f"{sign} {figure(self.target)}{self._suffix}", measured, self.verdict]
+        measured = "" if self.measured is None else self.written(self.measured)
+        what = f"{self.what} ({self.case})" if self.case else self.what
+        return [what, f"{sign} {self.written(self.target)}", measured, self.verdict]
 
-    @property
-    def _suffix(self) -> str:
-        return "x" if self.unit == "x" else f" {self.unit}"
+    def written(self, value: float) -> str:
+        """With its unit."""
+        return f"{figure(value)}{'x' if self.unit == 'x' else f' {self.unit}'}"
 
 
 @dataclass(frozen=True)

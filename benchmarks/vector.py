@@ -45,7 +45,9 @@ def measure(options: Options, console: Console) -> Result:
             console.print(f"P = {particles}: both give the same bits for {steps} steps, resets among them")
             times = race(particles, ROWS, options)
             result.claims.append(
-                Claim(f"native over SyncVectorEnv, {ROWS} rows, P = {particles}", target, times.ratio(SYNC, NATIVE))
+                Claim(
+                    f"vector environment: speed over SyncVectorEnv, P = {particles}", target, times.ratio(SYNC, NATIVE)
+                )
             )
             result.figures[str(particles)] = times.seconds
             low, high = times.spread(SYNC, NATIVE)
@@ -89,7 +91,7 @@ def _equal(got, wanted, step: int) -> None:
 def race(particles: int, rows: int, options: Options) -> Times:
     """Seconds a step of a row, by contestant."""
     calls = {name: episode(make(name, rows, particles=particles)) for name in MODES}
-    return interleave(calls, options, dict.fromkeys(calls, rows * Scenario.named(ID).periods))
+    return interleave(calls, options, dict.fromkeys(calls, rows * Scenario.named(ID).periods), warm=not options.short)
 
 
 def episode(envs: gym.vector.VectorEnv) -> Callable[[], None]:
@@ -119,11 +121,11 @@ def against_rows(options: Options, console: Console) -> dict[str, list[tuple[flo
             calls = {f"{NATIVE}, 1 thread": episode(make(NATIVE, rows))}
             if rows <= SYNC_ROWS:
                 calls[SYNC] = episode(make(SYNC, rows))
-            found = interleave(calls, few, units)
+            found = interleave(calls, few, units, warm=not options.short)
             for name in calls:
                 lines[name].append((rows, 1 / found.median(name)))
         call = episode(make(NATIVE, rows, threads))
-        found = interleave({everybody: call}, few, units, clock=time.perf_counter)
+        found = interleave({everybody: call}, few, units, clock=time.perf_counter, warm=not options.short)
         lines[everybody].append((rows, 1 / found.median(everybody)))
     return lines
 

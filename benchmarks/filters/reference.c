@@ -4,6 +4,8 @@
 #include <string.h>
 
 #define LANES 16
+#define BLOCK 8
+#define REACH 16
 typedef float lanes __attribute__((vector_size(4 * LANES)));
 
 struct model {
@@ -31,6 +33,11 @@ static inline int32_t to_bits(float x)
     int32_t bits;
     memcpy(&bits, &x, 4);
     return bits;
+}
+
+static inline int32_t greater(int32_t a, int32_t b)
+{
+    return a > b ? a : b;
 }
 
 static inline float log32(float x)
@@ -214,38 +221,65 @@ static double moments(int64_t n, const float *x, const float *weights, double *m
     return total;
 }
 
-static void resample(double u, int64_t n, float *restrict x, float *restrict log_weights, float *restrict weights,
-                     double total, int32_t *restrict ancestors)
+/* Every slot's ancestor, from REACH on: the particle after the last one that ends before the slot. Of the particles that
+   end at one place the last to be written stays; what is left is a running maximum. */
+static void inherit(double u, int64_t n, const float *restrict weights, double total, int32_t *restrict ended,
+                    int32_t *restrict recent, int32_t *restrict ancestors)
 {
-    memset(ancestors, 0, 4 * (size_t)(n + 1));
-    ancestors[0] = 1;
-    double scale = (double)n / total, cumulated = 0.0;
-    int32_t last = (int32_t)n, ancestor = -1;
-    for (int64_t i = 0; i < n - 1; i++) { /* how many particles end before each slot ... */
-        cumulated += (double)weights[i];
-        int32_t slot = (int32_t)(cumulated * scale - u + 1.0);
-        ancestors[slot < last ? slot : last] += 1;
+    memset(ended, 0, 4 * (size_t)(n + 4));
+    double scale = (double)n / total, base = 1.0 - u;
+    int32_t last = (int32_t)n;
+    int64_t whole = (n - 1) / BLOCK * BLOCK;
+    for (int64_t o = 0; o < whole; o += BLOCK) { /* sums apart, so that blocks need not wait for each other */
+        double cumulated = 0.0;
+        for (int64_t k = 0; k < BLOCK; k++) {
+            cumulated += (double)weights[o + k] * scale;
+            int32_t end = (int32_t)(base + cumulated);
+            ended[3 + (end < last ? end : last)] = (int32_t)(o + k + 1);
+        }
+        base += cumulated;
     }
-    for (int64_t k = 0; k < n; k++) { /* ... their running count is the slot's ancestor */
-        ancestor += ancestors[k];
-        ancestors[k] = ancestor;
+    for (int64_t i = whole; i < n - 1; i++) {
+        base += (double)weights[i] * scale;
+        int32_t end = (int32_t)base;
+        ended[3 + (end < last ? end : last)] = (int32_t)(i + 1);
     }
-    for (int axis = 0; axis < 4; axis++) {
-        float *restrict coordinate = x + axis * n;
-        for (int64_t k = 0; k < n; k++)
-            weights[k] = coordinate[(uint32_t)ancestors[k]];
-        memcpy(coordinate, weights, 4 * (size_t)n);
+    for (int64_t k = 0; k < n; k++)
+        recent[k + 12] = greater(greater(ended[k], ended[k + 1]), greater(ended[k + 2], ended[k + 3]));
+    for (int64_t k = 0; k < n; k++) {
+        int32_t here = greater(greater(recent[k], recent[k + 4]), greater(recent[k + 8], recent[k + 12]));
+        ancestors[k + REACH] = greater(here, ancestors[k]);
     }
-    memset(log_weights, 0, 4 * (size_t)n);
+}
+
+struct state {
+    float x, vx, y, vy;
+};
+
+static void draw(int64_t n, float *restrict x, const int32_t *restrict ancestors, struct state *restrict states,
+                 struct state *restrict drawn)
+{
+    float *restrict px = x, *restrict vx = x + n, *restrict py = x + 2 * n, *restrict vy = x + 3 * n;
+    for (int64_t i = 0; i < n; i++)
+        states[i] = (struct state){px[i], vx[i], py[i], vy[i]};
+    for (int64_t k = 0; k < n; k++)
+        drawn[k] = states[(uint32_t)ancestors[k]];
+    for (int64_t k = 0; k < n; k++) {
+        px[k] = drawn[k].x;
+        vx[k] = drawn[k].vx;
+        py[k] = drawn[k].y;
+        vy[k] = drawn[k].vy;
+    }
 }
 
 /* One period, counted from 1, of every row. Shapes: sensors, values (rows, members, 2); particles (rows, 4, n);
    log_weights (rows, n); mean (rows, 4): in, the reference of the sums; cov (rows, 4, 4); n_eff (rows);
-   scratch: weights (n), ancestors (n + 1). */
+   scratch: weights (n), slots (3, n + REACH) that start with zeros, states (2, n). */
 void filter_rows(int64_t rows, int64_t n, const struct model *m, int64_t period, const uint64_t *keys,
                  const double *sensors, const double *values, float *particles, float *log_weights, double *mean,
-                 double *cov, double *n_eff, float *weights, int32_t *ancestors)
+                 double *cov, double *n_eff, float *weights, int32_t *slots, struct state *states)
 {
+    int32_t *ended = slots, *recent = ended + n + REACH, *ancestors = recent + n + REACH;
     for (int64_t b = 0; b < rows; b++) {
         float *x = particles + 4 * n * b, *lw = log_weights + n * b;
         predict(stream_of(keys[b], (uint64_t)period, (uint64_t)m->process), n, x, m);
@@ -255,7 +289,9 @@ void filter_rows(int64_t rows, int64_t n, const struct model *m, int64_t period,
         double total = moments(n, x, weights, mean + 4 * b, cov + 16 * b, n_eff + b);
         if (n_eff[b] < m->resample_below * (double)n) {
             struct stream s = stream_of(keys[b], (uint64_t)period, (uint64_t)m->resampling);
-            resample((double)(bits_of(s, 0) >> 11) * 0x1p-53, n, x, lw, weights, total, ancestors);
+            inherit((double)(bits_of(s, 0) >> 11) * 0x1p-53, n, weights, total, ended, recent, ancestors);
+            draw(n, x, ancestors + REACH, states, states + n);
+            memset(lw, 0, 4 * (size_t)n);
         }
     }
 }

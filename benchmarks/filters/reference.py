@@ -12,6 +12,7 @@ import numpy as np
 from benchmarks.filters.contestant import Absent, Contestant
 from benchmarks.filters.problem import MEMBERS, PERIODS, Problem
 from wsn_env import draws
+from wsn_env.trackers.kernels import REACH
 
 SOURCE = Path(__file__).with_name("reference.c")
 # Neither errno nor traps are results, and without them gcc uses vectors throughout.
@@ -75,7 +76,11 @@ class Reference(Contestant):
         self.log_weights = np.empty((rows, count), np.float32)
         self.mean, self.cov, self.n_eff = np.empty((rows, 4)), np.empty((rows, 4, 4)), np.empty(rows)
         self.reports = [np.moveaxis(array, 1, 0).copy() for array in (problem.sensors, problem.values)]
-        self.scratch = np.empty(count, np.float32), np.empty(count + 1, np.int32)
+        self.scratch = (
+            np.empty(count, np.float32),
+            np.zeros((3, count + REACH), np.int32),
+            np.empty((2, count, 4), np.float32),
+        )
         arrays = (self.particles, self.log_weights, self.mean, self.cov, self.n_eff, *self.scratch)
         rest = [_pointer(array) for array in arrays]
         size = ctypes.c_int64(rows), ctypes.c_int64(count), ctypes.byref(self.model)
