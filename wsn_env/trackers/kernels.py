@@ -11,6 +11,7 @@ from wsn_env import draws
 from wsn_env.compiling import inline_piece, kernel, piece
 from wsn_env.draws import normal_pair32
 from wsn_env.numerics import F, exp, exp32, expm1_32, f32_bits, f32_from_bits, log, log32
+from wsn_env.types import Belief, Reports, network_of
 
 LANES = 16
 BLOCK = 8  # particles whose weights are summed apart when resampling
@@ -197,15 +198,14 @@ def moments(x, weights, reference, mean, cov):
         for k in range(LANES):
             s[row] += np.float64(lanes[row, k])
     total = s[0]
-    shift = s[2:6] / total
     entry = 6
     for a in range(4):
-        mean[a] = np.float64(F(reference[a])) + shift[a]
         for b in range(a, 4):
-            cov[a, b] = s[entry] / total - shift[a] * shift[b]
+            cov[a, b] = s[entry] / total - (s[2 + a] / total) * (s[2 + b] / total)
             cov[b, a] = cov[a, b]
             entry += 1
     for a in range(4):
+        mean[a] = np.float64(F(reference[a])) + s[2 + a] / total
         cov[a, a] = max(cov[a, a], 0.0)
     for a in range(4):
         for b in range(a + 1, 4):  # rounding must not correlate a collapsed cloud beyond 1
@@ -243,7 +243,7 @@ def resample(u, x, log_weights, weights, total, slots, states):
     Args:
         u: U[0, 1), the common offset of the slots.
         weights: (P,) summing to `total`.
-        slots: (3, P + 16) int32 scratch that starts with zeros.
+        slots: (3, P + 16) int32 scratch, the first 16 of each are zeros.
         states: (2, P) complex128 scratch.
     """
     inherit(u, weights, total, slots[0], slots[1], slots[2])
@@ -367,16 +367,15 @@ def filter_row(key, period, belief, network, reports, b, c, room):
 @piece
 def scratch(particles):
     """Room that `filter_row` needs: weights, slots and states."""
-    return (
-        np.empty(particles, np.float32),
-        np.zeros((3, particles + REACH), np.int32),
-        np.empty((2, particles), np.complex128),
-    )
+    slots = np.empty((3, particles + REACH), np.int32)
+    slots[:, :REACH] = 0  # what `inherit` never writes to
+    return np.empty(particles, np.float32), slots, np.empty((2, particles), np.complex128)
 
 
 @kernel
-def filter_rows(start, stop, constants, keys, periods, belief, network, reports, resampled):
-    """One period of the filter alone."""
+def filter_rows(start, stop, constants, keys, periods, resampled, *arrays):
+    """One period of the filter alone; `arrays` are the belief's, the reports' and the network's."""
+    belief, reports, network = Belief(*arrays[:3]), Reports(*arrays[3:6]), network_of(arrays[6:])
     room = scratch(belief.particles.shape[2])
     for b in range(start, stop):
         resampled[b] = filter_row(keys[b], periods[b], belief, network, reports, b, constants[0], room)

@@ -32,15 +32,5 @@ class ParticleTracker:
 
     def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
         """Predict, weigh, read mean and covariance, resample, in place."""
-        over_rows(
-            self._filter_rows,
-            len(keys),
-            self.threads,
-            self._constants,
-            keys,
-            periods,
-            belief,
-            network,
-            reports,
-            resampled,
-        )
+        arrays = *belief, *reports, *network.arrays()
+        over_rows(self._filter_rows, len(keys), self.threads, self._constants, keys, periods, resampled, *arrays)
