@@ -24,6 +24,7 @@ PACKAGE = Path(__file__).parent
 SERIAL_ROWS = 8  # up to here one thread is faster than handing work out
 
 FAST = {"reassoc", "contract", "arcp", "nsz"}  # not nnan, ninf: infinities and NaN mean what they mean
+FAST_MODULES = ("wsn_env.trackers.kernels", "wsn_env.numerics", "wsn_env.draws")  # the filter; the world stays strict
 
 # fastmath=False is said aloud: a piece that says nothing takes over what its first caller has.
 piece = numba.njit(error_model="numpy", nogil=True, fastmath=False, _nrt=True)
@@ -47,14 +48,14 @@ def fast(dispatcher):
     """The twin of a kernel or piece whose sums and products the compiler may regroup and fuse.
 
     Its results agree to rounding, but differ from processor to processor. The pieces that the function names get a
-    twin of their own, since a function compiled once keeps its rules wherever it is called from. Lean pieces, the
-    world's, stay strict, and so do those of a module (`draws.stream`): only the filter is fast. The twin's own name
-    keeps the two apart in the cache.
+    twin of their own, since a function compiled once keeps its rules wherever it is called from; pieces of other than
+    FAST_MODULES stay strict, and so do those named through their module (`draws.stream`). The twin's own name keeps
+    the two apart in the cache.
     """
     function = dispatcher.py_func
     seen = {name: function.__globals__.get(name) for name in function.__code__.co_names}
     pieces = {name: value for name, value in seen.items() if isinstance(value, Dispatcher)}
-    twins = {name: fast(value) for name, value in pieces.items() if value.targetoptions["_nrt"]}
+    twins = {name: fast(value) for name, value in pieces.items() if value.py_func.__module__ in FAST_MODULES}
     twin = FunctionType(function.__code__, function.__globals__ | twins, function.__name__, function.__defaults__)
     twin.__qualname__ = f"{function.__qualname__}_fast"
     compiled = numba.jit(**dispatcher.targetoptions | {"fastmath": FAST})(twin)

@@ -8,7 +8,7 @@ import numpy as np
 from numba import int32, uint32
 
 from wsn_env import draws
-from wsn_env.compiling import inline_piece, kernel, piece
+from wsn_env.compiling import inline_piece, kernel, lean_kernel, lean_piece, piece
 from wsn_env.draws import normal_pair32
 from wsn_env.numerics import F, exp, exp32, expm1_32, f32_bits, f32_from_bits, log, log32
 from wsn_env.types import Belief, Reports, network_of
@@ -22,7 +22,7 @@ LOG_LEAST, LOG_MOST = F(-13.815510558), F(-1.0000005e-6)  # p in [1e-6, 1 - 1e-6
 TINY = F(1e-30)
 
 
-@piece
+@lean_piece
 def spread(stream, mean, cov, x, log_weights):
     """Draw a cloud ~ N(mean, cov) with equal weights; x and y axes are taken as independent.
 
@@ -40,7 +40,7 @@ def spread(stream, mean, cov, x, log_weights):
     log_weights[:] = F(0)
 
 
-@piece
+@lean_piece
 def predict(stream, x, period_s, q):
     """Constant velocity with white acceleration of sd q [m/s^2] (eqs. 6, 8)."""
     px, vx, py, vy = x[0], x[1], x[2], x[3]
@@ -54,7 +54,7 @@ def predict(stream, x, period_s, q):
         vy[i] += g * ay
 
 
-@piece
+@lean_piece
 def weigh(x, log_weights, first, step, position, value, c):
     """Add a report's log likelihood to every step-th particle from the first on."""
     px, py = x[0], x[2]
@@ -86,7 +86,7 @@ def weigh(x, log_weights, first, step, position, value, c):
             log_weights[i] -= F(0.5) * (r * r)
 
 
-@piece
+@lean_piece
 def weigh_awake(x, log_weights, network, nodes, b, c):
     """Add what it tells that of the awake nodes of row b just `nodes` (m,) reported, whatever they measured.
 
@@ -106,7 +106,7 @@ def weigh_awake(x, log_weights, network, nodes, b, c):
             weigh_silence(x, log_weights, positions[node], 1.0 if k < 0 else c.delivery, c)
 
 
-@piece
+@lean_piece
 def weigh_detection(x, log_weights, position, c):
     """Add to every particle the log probability that the node at `position`, which reported, detects a target there."""
     px, py = x[0], x[2]
@@ -118,7 +118,7 @@ def weigh_detection(x, log_weights, position, c):
         log_weights[i] += log_detection32(dx * dx + dy * dy, curve)
 
 
-@piece
+@lean_piece
 def weigh_silence(x, log_weights, position, delivery, c):
     """Add log(1 - delivery p(d)): the node at `position` was awake and nothing was heard of it.
 
@@ -136,7 +136,7 @@ def weigh_silence(x, log_weights, position, delivery, c):
         log_weights[i] += log32(min(lost + sent * unseen, F(1)))  # <= 0, as log weights have to be
 
 
-@piece
+@lean_piece
 def detection_curve(c):
     """Eqs. 2-3 in float32 and logarithms: inner and outer end [m], ln l1, b1, b2, ln l2."""
     return (
@@ -160,7 +160,7 @@ def log_detection32(squared, curve):
     return min(max(log_ceiling - fall, LOG_LEAST), LOG_MOST)
 
 
-@piece
+@lean_piece
 def normalise(log_weights, weights):
     """Shift the log weights so that the best is 0; `weights` become their exponentials."""
     n = len(log_weights)
@@ -215,7 +215,7 @@ def moments(x, weights, reference, mean, cov):
     return total * total / s[1], total
 
 
-@piece
+@lean_piece
 def _gather(w, d0, d1, d2, d3, lanes, k):
     e0, e1, e2, e3 = w * d0, w * d1, w * d2, w * d3
     lanes[0, k] += w
@@ -236,7 +236,7 @@ def _gather(w, d0, d1, d2, d3, lanes, k):
     lanes[15, k] += e3 * d3
 
 
-@piece
+@lean_piece
 def resample(u, x, log_weights, weights, total, slots, states):
     """Systematic resampling in place, without a search.
 
@@ -251,7 +251,7 @@ def resample(u, x, log_weights, weights, total, slots, states):
     log_weights[:] = F(0)
 
 
-@piece
+@lean_piece
 def inherit(u, weights, total, ended, recent, ancestors):
     """Find every slot's ancestor: the particle after the last one that ends before the slot.
 
@@ -286,7 +286,7 @@ def inherit(u, weights, total, ended, recent, ancestors):
         ancestors[k + REACH] = max(here, ancestors[k])
 
 
-@piece
+@lean_piece
 def draw(x, ancestors, states, drawn):
     """Replace every particle by its ancestor; its four numbers move as one of 16 bytes."""
     n = x.shape[1]
@@ -306,7 +306,7 @@ def draw(x, ancestors, states, drawn):
         vy[k] = after[4 * k + 3]
 
 
-@piece
+@lean_piece
 def relocate(stream, mean, cov, x):
     """Draw the particles' positions anew ~ N(mean, cov); velocities and weights stay."""
     sx, sy = F(np.sqrt(cov[0, 0])), F(np.sqrt(cov[2, 2]))
@@ -316,7 +316,7 @@ def relocate(stream, mean, cov, x):
         x[2, i] = F(mean[2]) + sy * e1
 
 
-@kernel
+@lean_kernel
 def spread_rows(start, stop, keys, periods, rows, belief):
     """Spread the clouds of the rows marked in `rows` about their beliefs' mean and covariance."""
     for b in range(start, stop):
@@ -325,7 +325,7 @@ def spread_rows(start, stop, keys, periods, rows, belief):
             spread(stream, belief.row[b].mean, belief.row[b].cov, belief.particles[b], belief.log_weights[b])
 
 
-@kernel
+@lean_kernel
 def relocate_rows(start, stop, keys, periods, rows, belief):
     """Move the clouds of the rows marked in `rows` to their beliefs' position mean and covariance."""
     for b in range(start, stop):
