@@ -13,8 +13,9 @@ BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE = (
 )  # fmt: skip
 OURS = {"wsn_env, strict": VERMILLION, "wsn_env, fast": ORANGE}
 COLOURS = (BLUE, GREEN, PURPLE, SKY, BLACK)  # of the others, with another dash in every turn; yellow is too pale
+OUR_ENVIRONMENT = "vector environment"  # how its lines begin
 DASHES = ("-", "--", ":")
-LABEL_POINTS = 9.5  # height of a line of text
+LABEL_POINTS = 11  # height of a line of text
 
 
 def draw(plot: Plot, path: Path) -> None:
@@ -26,12 +27,14 @@ def draw(plot: Plot, path: Path) -> None:
 
     style = {"svg.hashsalt": plot.name, "svg.fonttype": "none", "font.size": 9, "font.family": "sans-serif"}
     with pyplot.rc_context(style):
-        figure, axes = pyplot.subplots(figsize=(8, 5), layout="constrained")
+        figure, axes = pyplot.subplots(figsize=(8, 5 if len(plot.lines) <= 12 else 6.5), layout="constrained")
         colours = {}
         others = [name for name in plot.lines if name not in OURS]
         for name, line in plot.lines.items():
             turn = others.index(name) if name in others else 0
             colours[name] = OURS.get(name) or COLOURS[turn % len(COLOURS)]
+            if name.startswith(OUR_ENVIRONMENT):
+                colours[name] = VERMILLION
             dash = "-" if name in OURS else DASHES[turn // len(COLOURS) % len(DASHES)]
             width = 2.5 if name in OURS else 1.4
             axes.loglog(*zip(*line), dash, color=colours[name], linewidth=width, marker="o", markersize=width + 1.5)

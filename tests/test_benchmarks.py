@@ -188,9 +188,11 @@ def test_the_page_has_a_place_for_every_claim():
 
 def test_whole_environments_are_lines_beside_the_filters():
     filters = race.Plot("rows", "Filters", "rows B", "filter steps/s", {"ours": [(1, 2.0)]})
-    environments = race.Plot("env_rows", "Environments", "rows B", "environment steps/s", {"native": [(1, 1.0)]})
+    environments = race.Plot(
+        "env_rows", "Environments", "rows B", "environment steps/s", {"vector environment": [(1, 1.0)]}
+    )
     results = [race.Result("vector", "", plots=[environments]), race.Result("filter_scaling", "", plots=[filters])]
-    assert [*page.plots(results)["rows"].lines] == ["ours", "environment: native"]
+    assert [*page.plots(results)["rows"].lines] == ["ours", "vector environment"]
 
 
 def test_a_claim_without_a_place_of_its_own_stands_under_further():
