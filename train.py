@@ -8,14 +8,11 @@ Reads top to bottom: settings -> environment -> PPO -> saved policy -> paired co
 from __future__ import annotations
 
 import json
-import os
 import sys
 import time
 from collections import deque
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-
-os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # before torch: its threads, waiting busily, would stop all others
 
 import numpy as np
 import torch
@@ -89,8 +86,9 @@ class Training:
     """Units of the two hidden layers."""
     seed: int = 0
     """Of training, below 2^31 - steps - rows; evaluation seeds lie above."""
-    torch_threads: int = 2
-    """Cores for PPO's updates; another number trains another policy, since sums are split otherwise."""
+    torch_threads: int = 1
+    """Cores for PPO's updates. A second gains a tenth at best, and costs up to ten times the time as soon as anything
+    else runs; it also trains another policy, since sums are split otherwise."""
     checkpoint_steps: int = 500_000
     """Periods between checkpoints."""
 
