@@ -1,5 +1,5 @@
 """The filter kernel's time is a + b P B on one thread: every point lies within 20 % of the line for 500 to 50,000
-particles, 1 to 1024 rows and P B >= 5000 (35 % where a row's working set is beyond the L2 cache).
+particles, 1 to 1024 rows and P B >= 5000 (35 % where a call's data are beyond the L2 cache).
 
     python -m benchmarks.filter_scaling [--rounds N] [--short] [--json FILE]
 
@@ -18,7 +18,7 @@ STRICT = "wsn_env, strict"
 PARTICLES, ROWS = (500, 1000, 2000, 5000, 10_000, 20_000, 50_000), (1, 4, 16, 64, 256, 1024)
 PLOT_PARTICLES = (500, 1500, 5000, 15_000, 50_000)
 LEAST = 5000  # particles in all rows: below, the call itself counts
-BYTES = 68  # a particle in a row: state and log weight; weight, 3 slots and 2 states of scratch
+BYTES, SCRATCH_BYTES = 20, 48  # a particle: state and log weight; and of one row weight, 3 slots, 2 states
 WITHIN, BEYOND = 20.0, 35.0  # %
 RACED = [name for name in CONTESTANTS if name not in SLOW_STARTERS]
 SHORT_LIMIT = 50_000  # particles in all rows
@@ -32,7 +32,9 @@ def measure(options: Options, console: Console) -> Result:
     grid = kernel_grid(options, console)
     a, b = fit(grid)
     deviations = {point: 100 * (seconds / (a + b * point[0] * point[1]) - 1) for point, seconds in grid.items()}
-    inside = {point: value for point, value in deviations.items() if BYTES * point[0] <= l2_bytes()}
+    inside = {
+        (p, rows): value for (p, rows), value in deviations.items() if p * (BYTES * rows + SCRATCH_BYTES) <= l2_bytes()
+    }
     outside = {point: value for point, value in deviations.items() if point not in inside}
     result.text = (
         f"Strict kernel, positions, m = 4: {1e6 * a:.1f} us + {1e9 * b:.2f} ns a particle. Each entry is the time of a"
@@ -41,7 +43,7 @@ def measure(options: Options, console: Console) -> Result:
     result.tables.append(table(grid, deviations))
     for where, points, target in (("within", inside, WITHIN), ("beyond", outside, BEYOND)):
         measured = max(map(abs, points.values()), default=None)
-        what = f"filter kernel: distance from a + b P B, a row's working set {where} L2"
+        what = f"filter kernel: distance from a + b P B, a call's data {where} L2"
         result.claims.append(Claim(what, target, measured, "%", at_most=True, why="no such point"))
     by_particles, by_rows = against_particles(options, console, result), against_rows(options, console)
     result.plots = [

@@ -207,7 +207,8 @@ class Result:
             console.print(_rich("Claims", ["claim", "target", "measured", "verdict"], rows))
 
     def save(self, path: Path) -> None:
-        """As JSON."""
+        """As JSON; the folder is made."""
+        path.parent.mkdir(parents=True, exist_ok=True)
         claims = [asdict(claim) | {"holds": claim.holds} for claim in self.claims]
         with replacing(path) as temporary:
             temporary.write_text(json.dumps(asdict(self) | {"claims": claims}, indent=1) + "\n")

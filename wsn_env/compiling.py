@@ -17,6 +17,7 @@ from pathlib import Path
 from types import FunctionType
 
 import numba
+import numpy as np
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.dispatcher import Dispatcher
 
@@ -121,10 +122,16 @@ def over_rows(kernel, rows: int, threads: int, *arguments) -> int:
     if threads == 1 or rows <= SERIAL_ROWS:
         return kernel(0, rows, *arguments) or 0
     if threads not in _pools:
-        _pools[threads] = ThreadPoolExecutor(threads, thread_name_prefix="wsn_env")
+        _pools[threads] = ThreadPoolExecutor(threads - 1, thread_name_prefix="wsn_env")
     bounds = [rows * i // threads for i in range(threads + 1)]
-    jobs = [_pools[threads].submit(kernel, a, b, *arguments) for a, b in zip(bounds, bounds[1:]) if b > a]
-    return sum(job.result() or 0 for job in jobs)
+    others = [_pools[threads].submit(kernel, a, b, *arguments) for a, b in zip(bounds[1:], bounds[2:]) if b > a]
+    own = kernel(0, bounds[1], *arguments) or 0
+    return own + sum(job.result() or 0 for job in others)
+
+
+def threads_for(marked, threads: int) -> int:
+    """How many threads serve a kernel that works in the marked rows (B,) only: waking them for a few takes longer."""
+    return threads if np.count_nonzero(marked) > SERIAL_ROWS else 1
 
 
 def available_threads() -> int:

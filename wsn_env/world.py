@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wsn_env import compiling, episode, period
-from wsn_env.compiling import available_threads, over_rows
+from wsn_env.compiling import available_threads, over_rows, threads_for
 from wsn_env.physics.constants import constants
 from wsn_env.physics.motion import motion_parameters
 from wsn_env.scenario import Scenario
@@ -65,11 +65,11 @@ class World:
             raise ValueError(f"rows {rows.shape} and keys {keys.shape}: must both be ({state.rows},)")
         state = state if donate else state.copy()
         outcome = _nothing_yet(state)
-        self._over_rows(episode.begin, rows, keys, *self._beginning, state)
+        self._in_rows(rows, episode.begin, keys, *self._beginning, state)
         self.tracker.start(state.key, state.period.copy(), rows, state.belief)
         if self.scenario.tracking.start == "search":
             self._search(rows, state, outcome)
-        self._over_rows(period.settle, rows, state, outcome)
+        self._in_rows(rows, period.settle, state, outcome)
         return state, outcome
 
     def step(self, state: State, cluster: Cluster, donate: bool = False) -> tuple[State, Outcome]:
@@ -98,16 +98,19 @@ class World:
             n_lost = self._over_rows(period.conclude, resampled, lost, state, outcome)
         if n_lost:
             self._search(lost, state, outcome)
-            self._over_rows(period.settle, lost, state, outcome)
+            self._in_rows(lost, period.settle, state, outcome)
         return state, outcome
 
     def _search(self, rows, state: State, outcome: Outcome) -> None:
         found = np.zeros(state.rows, bool)
-        self._over_rows(period.search, rows, found, state, outcome)
+        self._in_rows(rows, period.search, found, state, outcome)
         self.tracker.relocate(state.key, state.period.copy(), found, state.belief)
 
     def _over_rows(self, kernel, *arguments) -> int:
         return over_rows(kernel, len(arguments[0]), self.threads, self._constants, *arguments)  # all lead with B
+
+    def _in_rows(self, rows, kernel, *arguments) -> None:
+        over_rows(kernel, len(rows), threads_for(rows, self.threads), self._constants, rows, *arguments)
 
 
 def _nothing_yet(state: State) -> Outcome:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from gymnasium import spaces
 
-from wsn_env.compiling import lean_kernel, lean_piece, over_rows
+from wsn_env.compiling import lean_kernel, lean_piece, over_rows, threads_for
 from wsn_env.interface.merit import gain, mean_detection
 from wsn_env.numerics import log
 from wsn_env.physics.constants import constants
@@ -170,7 +170,8 @@ class CandidatesObservation:
     def _fill(self, out, view: View, rows):
         filled, seen = (*view.nearest(self.shape[0]), out), (view.row, view.belief, view.reports.count)
         numbers = self._constants, self._battery_j
-        over_rows(_encode, len(rows), self._threads, *numbers, rows, *filled, *seen, *view.network.arrays())
+        threads = threads_for(rows, self._threads)
+        over_rows(_encode, len(rows), threads, *numbers, rows, *filled, *seen, *view.network.arrays())
         return out
 
 

@@ -1,7 +1,7 @@
 """The cluster particle filter (Xiang & Guo, 2013, eqs. 9-15); its arithmetic stands in `kernels`."""
 
 from wsn_env import compiling
-from wsn_env.compiling import over_rows
+from wsn_env.compiling import over_rows, threads_for
 from wsn_env.physics.constants import constants
 from wsn_env.scenario import Scenario
 from wsn_env.trackers import kernels
@@ -24,11 +24,13 @@ class ParticleTracker:
 
     def start(self, keys, periods, rows, belief: Belief) -> None:
         """Draw the clouds of the marked rows from N(mean, cov), in place."""
-        over_rows(kernels.spread_rows, len(keys), self.threads, keys, periods, rows, belief)
+        threads = threads_for(rows, self.threads)
+        over_rows(kernels.spread_rows, len(keys), threads, keys, periods, rows, belief)
 
     def relocate(self, keys, periods, rows, belief: Belief) -> None:
         """Draw the positions of the marked rows' particles from N(mean, cov), in place; keep the velocities."""
-        over_rows(kernels.relocate_rows, len(keys), self.threads, keys, periods, rows, belief)
+        threads = threads_for(rows, self.threads)
+        over_rows(kernels.relocate_rows, len(keys), threads, keys, periods, rows, belief)
 
     def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
         """Predict, weigh, read mean and covariance, resample, in place."""
