@@ -87,8 +87,8 @@ class Training:
     seed: int = 0
     """Of training, below 2^31 - steps - rows; evaluation seeds lie above."""
     torch_threads: int = 1
-    """Cores for PPO's updates. A second gains a tenth at best, and costs up to ten times the time as soon as anything
-    else runs; it also trains another policy, since sums are split otherwise."""
+    """Cores for PPO's updates. A second gains a tenth at best, and multiplies the time as soon as anything else
+    runs; it also trains another policy, since sums are split otherwise."""
     checkpoint_steps: int = 500_000
     """Periods between checkpoints."""
 

@@ -286,3 +286,13 @@ def test_scenarios_and_ids_agree():
     with pytest.raises(ScenarioError):
         Scenario.named("wsn_env/None-v0")
     assert wsn_env.__version__
+
+
+def test_an_observation_may_be_written_into():
+    envs = ClusterVectorEnv(3, autoreset_mode="Disabled", **SMALL)
+    envs.reset(seed=0)
+    observation = envs.step(np.full(3, 12))[0]
+    seen = observation.copy()
+    observation[:] = 7.0
+    again, _ = envs.reset(options={"reset_mask": np.array([True, False, True])})
+    assert (again[1] == seen[1]).all() and not (again[0] == seen[0]).all()

@@ -184,10 +184,11 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         """The observation of all rows, of which only `rows` have changed since the last."""
         before, self._view = self._view, View.of(self._state)
         if rows is None or before is None or rows.all():
-            self._last = self.interface.observation.encode(self._view)
+            observation = self.interface.observation.encode(self._view)
         else:
-            self._last = self.interface.observation.renew(self._view, rows, before, self._last)
-        return self._last
+            observation = self.interface.observation.renew(self._view, rows, before, self._last)
+        self._last = observation.copy()  # whoever gets it may write into it
+        return observation
 
 
 def _stacked(actions):
