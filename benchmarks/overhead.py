@@ -124,7 +124,9 @@ class Recorder:
     def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
         """A new period."""
         width = max(1, reports.count.max())
-        seen = Reports(reports.count.copy(), reports.node[:, :width].copy(), reports.value[:, :width].copy())
+        seen = Reports(
+            reports.count.copy(), reports.node[:, :width].copy(), reports.value[:, :width].copy(), reports.bitmap
+        )
         predicted = belief.predicted_mean.copy()
         self.tracker.correct(keys, periods, belief, network, reports, resampled)
         self.record.corrections.append(Correction(periods.copy(), predicted, seen, resampled.copy()))

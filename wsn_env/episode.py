@@ -22,7 +22,6 @@ START = np.dtype(
         ("field_key", "u8"),
     ]
 )
-SEARCHED_SD_MS = 1.0  # m/s: what is known of the velocity before a first search
 
 
 def start_record(scenario: Scenario) -> np.ndarray:
@@ -31,7 +30,7 @@ def start_record(scenario: Scenario) -> np.ndarray:
     record = np.zeros(1, START)
     record["known"] = known
     record["sd_m"] = scenario.tracking.start_sd_m if known else scenario.field.side_m / 12**0.5
-    record["sd_ms"] = scenario.tracking.start_sd_ms if known else SEARCHED_SD_MS
+    record["sd_ms"] = scenario.tracking.start_sd_ms if known else scenario.tracking.search_sd_ms
     record["battery"] = scenario.radio.battery_j
     record["low"], record["high"] = scenario.lam_range
     if scenario.field.field_seed is not None:
@@ -71,7 +70,9 @@ def begin(start, stop, cs, rows, keys, motion, numbers, recordings, starts, plac
         network.row[b].alive = network.battery.shape[1]
         network.row[b].head = -1
         network.row[b].n_members = 0
+        state.sensed[b] = 0
         state.reports.count[b] = 0
+        state.reports.bitmap[b] = 0
         belief.n_eff = state.belief.particles.shape[2]
         track_stream = draws.stream(key, 0, draws.TRACK)
         draw_track(motion, numbers, recordings, track_stream, c.period_s, c.side_m, state.track[b])

@@ -90,6 +90,15 @@ def exp(x):
 
 
 @piece
+def normal_cdf(x):
+    """Phi(x) within 1e-7 (Abramowitz & Stegun, 1964, 26.2.17)."""
+    k = 1.0 / (1.0 + 0.2316419 * abs(x))
+    tail = k * (0.319381530 + k * (-0.356563782 + k * (1.781477937 + k * (-1.821255978 + k * 1.330274429))))
+    tail *= 0.3989422804014327 * exp(-0.5 * x * x)
+    return tail if x < 0.0 else 1.0 - tail
+
+
+@piece
 def sincos(x):
     """(sin x, cos x) for |x| < 1e5 rad."""
     n = np.floor(x / HALF_PI + 0.5)

@@ -71,7 +71,7 @@ def _sense_and_report(head, chosen, state, outcome, b, c):
         for k in range(n + 1):
             node = head if k == place else members[k - (k > place)]
             if _wake(node, radio.SENSING, state, outcome, b, c):
-                _detect_and_report(node, head, radio.REPORT, target, state, outcome, b, c)
+                _sense(node, head, radio.REPORT, target, state, outcome, b, c)
     _remember_miss(state, b, c)
 
 
@@ -135,25 +135,48 @@ def _wake(node, purpose, state, outcome, b, c):
 
 
 @lean_piece
-def _detect_and_report(node, head, purpose, target, state, outcome, b, c):
+def _sense(node, head, purpose, target, state, outcome, b, c):
     """An awake node's period: detect, measure, report."""
     positions, battery, reports = state.network.positions[b], state.network.battery[b], state.reports
     key, period = state.key[b], state.row[b].period
     distance = np.sqrt(squared_distance(positions, node, target[0], target[1]))
-    if battery[node] <= 0.0 or not sensing.detects(key, period, node, distance, c):
+    if battery[node] <= 0.0:
+        return
+    value = sensing.tells(key, period, node, distance, c)
+    has_news = _update_state(node, value, purpose, state, b, c) if c.model == sensing.BINARY else value
+    if not has_news:
         return
     outcome.row[b].detections += 1
-    if battery[head] > 0.0 and radio.report(node, head, purpose, state, outcome, b, c):
+    if radio.report(node, head, target, purpose, state, outcome, b, c):
         slot = reports.count[b]
         reports.node[b, slot] = node
-        sensing.measure(key, period, node, positions, target, c, reports.value[b, slot])
+        if c.model == sensing.BINARY:
+            reports.value[b, slot, 0] = value
+            reports.value[b, slot, 1] = 0.0
+            reports.bitmap[b, node] = value
+        else:
+            sensing.measure(key, period, node, positions, target, c, reports.value[b, slot])
         reports.count[b] += 1
+
+
+@lean_piece
+def _update_state(node, value, purpose, state, b, c):
+    """A binary sensor compares what it senses with what it sensed last. Returns whether it has to report.
+
+    In a search everybody is asked, and silence means 0; so it does where every presence is reported.
+    """
+    changed = value != (state.sensed[b, node] != 0)
+    state.sensed[b, node] = value
+    if c.every_presence or purpose == radio.SEARCH:
+        state.reports.bitmap[b, node] = 0
+        return value
+    return changed or (c.refresh > 0 and state.row[b].period % c.refresh == 0)
 
 
 @lean_piece
 def _remember_miss(state, b, c):
     """How improbable the silence since the last report is, seen from the belief."""
-    if state.reports.count[b] > 0:
+    if _hears_of_target(state, b, c):
         state.row[b].log_miss = 0.0
     else:
         network, belief = state.network, state.belief.row[b]
@@ -170,12 +193,26 @@ def _remember_miss(state, b, c):
 
 
 @lean_piece
+def _hears_of_target(state, b, c):
+    """Whether a report came in; of binary sensors, whose state often stays, whether any that is awake is known to
+    detect."""
+    if c.model != sensing.BINARY:
+        return state.reports.count[b] > 0
+    standing, members, bitmap = state.network.row[b], state.network.members[b], state.reports.bitmap[b]
+    found = standing.head >= 0 and bitmap[standing.head] != 0
+    for k in range(standing.n_members):
+        found |= bitmap[members[k]] != 0
+    return found
+
+
+@lean_piece
 def _conclude(resampled, state, outcome, b, c):
     """After the correction: the broadcast, and the end of the period unless a search must come first; returns
     whether it must."""
     if resampled and state.network.row[b].head >= 0:
         outcome.row[b].resampled = True
-        radio.broadcast(state, outcome, b, c)
+        if c.receiver == radio.TO_HEAD:
+            radio.broadcast(state, outcome, b, c)
     lost = _is_lost(state, b, c)
     if not lost:
         _settle(state, outcome, b, c)
@@ -214,8 +251,11 @@ def search(start, stop, cs, rows, found, state, outcome):
             outcome.row[b].detections = 0
             state.reports.count[b] = 0
             for node in range(state.network.battery.shape[1]):
-                _detect_and_report(node, strongest, radio.SEARCH, _target(state, b), state, outcome, b, c)
+                _sense(node, strongest, radio.SEARCH, _target(state, b), state, outcome, b, c)
             found[b] = _restart_at_centroid(state, b, c)
+        elif c.model == sensing.BINARY:  # asked, all keep silent
+            state.sensed[b] = 0
+            state.reports.bitmap[b] = 0
 
 
 @lean_piece
@@ -241,8 +281,9 @@ def _wake_all(state, outcome, b, c):
             continue
         outcome.row[b].members += 1
         squared = squared_distance(positions, node, target[0], target[1])
-        if battery[node] > 0.0 and sensing.detects(key, period, node, np.sqrt(squared), c):
-            signal = -squared if c.model == 0 else sensing.measured_strength(key, period, node, squared, c)
+        if battery[node] > 0.0 and sensing.tells(key, period, node, np.sqrt(squared), c):
+            has_strength = c.model != sensing.POSITION and c.model != sensing.BINARY
+            signal = sensing.measured_strength(key, period, node, squared, c) if has_strength else -squared
             if signal > best:
                 strongest, best = node, signal
     return strongest

@@ -21,12 +21,22 @@ def quantity(default, meaning, **allowed):
 
 
 def check_quantity(
-    owner: str, name: str, value, *, above=None, at_least=None, at_most=None, whole=False, choices=None, optional=False
+    owner: str,
+    name: str,
+    value,
+    *,
+    above=None,
+    at_least=None,
+    at_most=None,
+    below=None,
+    whole=False,
+    choices=None,
+    optional=False,
 ) -> None:
     """Raise ScenarioError unless `value` is allowed for the field `name` of `owner`.
 
     Args:
-        above, at_least, at_most: bounds.
+        above, at_least, at_most, below: bounds.
         whole: whole numbers only.
         choices: these values only.
         optional: None too.
@@ -45,9 +55,10 @@ def check_quantity(
         and (above is None or value > above)
         and (at_least is None or value >= at_least)
         and (at_most is None or value <= at_most)
+        and (below is None or value < below)
     )
     if not good:
-        bounds = (("above", above), ("at least", at_least), ("at most", at_most))
+        bounds = (("above", above), ("at least", at_least), ("at most", at_most), ("below", below))
         rules = " and ".join(f"{words} {bound}" for words, bound in bounds if bound is not None)
         kind = "a whole number" if whole else "a finite number"
         raise ScenarioError(f"{owner}.{name} = {value!r}: must be {kind} {rules}".rstrip())

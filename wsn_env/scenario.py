@@ -11,6 +11,7 @@ from wsn_env.quantity import NUMBERS, ScenarioError, Section, quantity, suggest
 from wsn_env.sections import (
     MEASUREMENTS,
     MOTIONS,
+    Binary,
     Crossing,
     Detection,
     Field,
@@ -21,6 +22,8 @@ from wsn_env.sections import (
     Rssi,
     Tracking,
 )
+
+RING_OF_EIGHT = tuple((x, y) for y in (0.0, 100.0, 200.0) for x in (0.0, 100.0, 200.0) if (x, y) != (100.0, 100.0))
 
 KINDS = {
     "name": (str,),
@@ -65,6 +68,16 @@ class Scenario(Section):
         if len(pair) != 2 or any(isinstance(x, bool) or not isinstance(x, NUMBERS) for x in pair):
             raise ScenarioError(f"Scenario.lam = {self.lam!r}: must be a number of m/mJ or a pair of them")
         return float(pair[0]), float(pair[1])
+
+    @property
+    def binary(self) -> bool:
+        """Whether nodes report a single bit."""
+        return isinstance(self.measurement, Binary)
+
+    @property
+    def ring_m(self) -> float:
+        """How far from the target a node tells most: at the edge of detection for one bit, as near as may be else."""
+        return self.detection.radius_m if self.binary else 0.0
 
     @property
     def filter_q(self) -> float:
@@ -153,4 +166,26 @@ class Scenario(Section):
 PRESETS = {
     "PreDC-v0": Scenario(name="PreDC-v0"),
     "Rssi-v0": Scenario(name="Rssi-v0", measurement=Rssi()),
+    "Binary-v0": Scenario(
+        name="Binary-v0",
+        periods=50,
+        lam=0.5,
+        field=Field(nodes=600, side_m=500.0),
+        motion=Crossing(margin_m=60.0, crossing_m=250.0, acceleration_ms2=0.1),
+        detection=Detection(radius_m=60.0, softness=1e-6, ceiling=1.0),
+        measurement=Binary(),
+        radio=Radio(receiver="sink", report_bits=64, invitation_bits=0),
+        tracking=Tracking(filter_q=0.3, start_sd_m=10.0, start_sd_ms=1.0, search_sd_ms=10.0),
+    ),
+    "Anchors-v0": Scenario(
+        name="Anchors-v0",
+        lam=4.0,
+        periods=50,
+        field=Field(side_m=200.0, positions=RING_OF_EIGHT),
+        motion=Crossing(margin_m=20.0, crossing_m=80.0, acceleration_ms2=0.5),
+        detection=Detection(radius_m=360.0, ceiling=1.0),
+        measurement=Rssi(exponent=3.0),
+        radio=Radio(receiver="target", report_bits=128, invitation_bits=0, retries=0),
+        tracking=Tracking(filter_q=1.0, start_sd_m=10.0, start_sd_ms=1.0, search=False),
+    ),
 }

@@ -208,7 +208,28 @@ class RssiPower(Measurement):
     floor_m: float = quantity(1.0, "nearer than this the power grows no more", above=0)
 
 
-MEASUREMENTS = {"position": Position, "rssi": Rssi, "rssi_power": RssiPower}
+@dataclass(frozen=True)
+class Binary(Measurement):
+    """One bit: whether the node detects (Zhou, Cheng & Xing, 2009); a hard disc where detection has no soft edge.
+
+    A node compares with what it sensed last, however long ago, and reports the new state when it differs; before it has
+    ever sensed, that is 0.
+    """
+
+    code: ClassVar[int] = 4
+    reports: str = quantity(
+        "changes",
+        "changes: a state that differs from the last one sensed; presence: every 1, in every period",
+        choices=("changes", "presence"),
+    )
+    refresh: int = quantity(
+        0, "in every so many periods all awake nodes report their state; 0: never", at_least=0, whole=True
+    )
+    flip: float = quantity(0.0, "probability that a node misreads its state in a period", at_least=0, below=0.5)
+    edge_m: float = quantity(1.0, "width of the edge of detection that the particle filter believes in", above=0)
+
+
+MEASUREMENTS = {"position": Position, "rssi": Rssi, "rssi_power": RssiPower, "binary": Binary}
 
 
 # --- what talking costs ------------------------------------------------------------------------------------
@@ -233,6 +254,12 @@ class Radio(Section):
     )
     packet_success: float = quantity(1.0, "probability that one try of a report arrives", at_least=0, at_most=1)
     retries: int = quantity(3, "further tries of a lost report", at_least=0, at_most=15, whole=True)
+    receiver: str = quantity(
+        "head",
+        "who hears the awake nodes: the cluster's head; a sink on mains in the middle of the field; or the target, whose"
+        " own node hears their beacons",
+        choices=("head", "sink", "target"),
+    )
     sensing_nj: float = quantity(0.0, "energy of an awake node's sensing, per period", at_least=0)
     battery_j: float = quantity(1.0, "a node's energy at the start", above=0)
 
@@ -276,6 +303,7 @@ class Tracking(Section):
     start: str = quantity("known", "known: mean ~ N(truth, P0); search: from a search", choices=("known", "search"))
     start_sd_m: float = quantity(1.0, "position sd of P0", above=0, at_most=100_000)
     start_sd_ms: float = quantity(0.1, "velocity sd of P0", above=0, at_most=1000)
+    search_sd_ms: float = quantity(1.0, "velocity sd before a first search", above=0, at_most=1000)
     search: bool = quantity(True, "search for lost tracks", choices=(True, False))
     search_miss: float = quantity(1e-3, "search when missing so long was less probable", above=0, at_most=1)
     search_gap: int = quantity(5, "periods between searches, at least", at_least=1, whole=True)

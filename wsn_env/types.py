@@ -50,7 +50,8 @@ class Reports(NamedTuple):
 
     count: np.ndarray  # (B,)
     node: np.ndarray  # (B, S) int32
-    value: np.ndarray  # (B, S, 2): x, y [m]; or the strength and 0
+    value: np.ndarray  # (B, S, 2): x, y [m]; or the strength and 0; or the state, 1 or 0, and 0
+    bitmap: np.ndarray  # (B, S) int8: the state of each binary sensor as last reported; (B, 0) for other sensors
 
 
 GRID = np.dtype([("x_m", "f8"), ("y_m", "f8"), ("cell_m", "f8"), ("side", "i8")], align=True)
@@ -131,6 +132,7 @@ class State(NamedTuple):
 
     key: np.ndarray  # (B,) uint64: all randomness of the episode
     track: np.ndarray  # (B, periods + 1, 4): the target's true states, drawn at the start
+    sensed: np.ndarray  # (B, S) int8: what each binary sensor sensed last, known to itself alone; else (B, 0)
     row: np.ndarray  # (B,) STATE: what the network knows beside the following
     network: Network
     ledger: Ledger
@@ -145,11 +147,13 @@ class State(NamedTuple):
         return len(self.key)
 
     @classmethod
-    def zeros(cls, rows: int, nodes: int, periods: int, particles: int) -> State:
+    def zeros(cls, rows: int, nodes: int, periods: int, particles: int, binary: bool = False) -> State:
         """Of the right shapes, before an episode begins."""
+        states = nodes if binary else 0
         return cls(
             key=np.zeros(rows, np.uint64),
             track=np.zeros((rows, periods + 1, 4)),
+            sensed=np.zeros((rows, states), np.int8),
             row=np.zeros(rows, STATE),
             network=Network(
                 row=np.zeros(rows, NETWORK),
@@ -159,7 +163,12 @@ class State(NamedTuple):
                 grid=Grid.zeros(rows, nodes),
             ),
             ledger=Ledger(np.zeros(rows, np.int64), np.zeros((rows, nodes), np.int32), np.zeros((rows, nodes))),
-            reports=Reports(np.zeros(rows, np.int64), np.zeros((rows, nodes), np.int32), np.zeros((rows, nodes, 2))),
+            reports=Reports(
+                count=np.zeros(rows, np.int64),
+                node=np.zeros((rows, nodes), np.int32),
+                value=np.zeros((rows, nodes, 2)),
+                bitmap=np.zeros((rows, states), np.int8),
+            ),
             belief=Belief(
                 row=np.zeros(rows, BELIEF),
                 particles=np.zeros((rows, 4, particles), np.float32),
@@ -173,15 +182,31 @@ class State(NamedTuple):
 
     def arrays(self) -> tuple[np.ndarray, ...]:
         """One after the other."""
-        return self.key, self.track, self.row, *self.network.arrays(), *self.ledger, *self.reports, *self.belief
+        return (
+            self.key,
+            self.track,
+            self.sensed,
+            self.row,
+            *self.network.arrays(),
+            *self.ledger,
+            *self.reports,
+            *self.belief,
+        )
 
 
 @spliced
 def state_of(arrays):
     """The state whose `arrays()` they are."""
-    network, ledger, reports, belief = arrays[3:10], arrays[10:13], arrays[13:16], arrays[16:19]
+    network, ledger, reports, belief = arrays[4:11], arrays[11:14], arrays[14:18], arrays[18:21]
     return State(
-        arrays[0], arrays[1], arrays[2], network_of(network), Ledger(*ledger), Reports(*reports), Belief(*belief)
+        arrays[0],
+        arrays[1],
+        arrays[2],
+        arrays[3],
+        network_of(network),
+        Ledger(*ledger),
+        Reports(*reports),
+        Belief(*belief),
     )
 
 
@@ -223,7 +248,7 @@ OUTCOME = np.dtype(
         ("energy_mj", "f8"),
         ("energy_j", "f8", len(PURPOSES)),  # by purpose
         ("members", "i8"),  # awake nodes, head included; all that woke in a search
-        ("detections", "i8"),  # awake nodes that detected
+        ("detections", "i8"),  # awake nodes that detected; of binary sensors, those that had a state to report
         ("delivered", "i8"),  # reports the head had, its own included
         ("dropped", "i8"),  # chosen nodes that were dead or named twice or out of range
         ("handover", "?"),  # the head's role went to another node

@@ -82,6 +82,11 @@ class View:
         return _mask(self.reports.node, self.reports.count)
 
     @cached_property
+    def sees(self) -> np.ndarray:
+        """(B, S) bool: who detects the target, as far as known: `detected`; the bitmap of binary sensors."""
+        return self.reports.bitmap > 0 if self.reports.bitmap.shape[1] else self.detected
+
+    @cached_property
     def measured(self) -> np.ndarray:
         """(B, S, 2): what they reported, zero elsewhere."""
         values = np.zeros(self.positions.shape)
@@ -104,15 +109,16 @@ class View:
         """(B, S) of the nodes to the prediction [m]."""
         return geometry.distances_to(self.positions, self.prediction)
 
-    def nearest(self, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """The living nodes nearest to the prediction: (B, count) nodes, -1 for none, and distances [m]."""
-        if count not in self._nearest:
-            self._nearest[count] = geometry.nearest(self.network, self.prediction, count)
-        return self._nearest[count]
+    def nearest(self, count: int, ring_m: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """The living nodes nearest to the prediction, or to a ring about it: (B, count) nodes, -1 for none, and their
+        distances to the prediction [m]."""
+        if (count, ring_m) not in self._nearest:
+            self._nearest[count, ring_m] = geometry.nearest(self.network, self.prediction, count, ring_m)
+        return self._nearest[count, ring_m]
 
-    def remember_nearest(self, nodes: np.ndarray, distances: np.ndarray) -> None:
+    def remember_nearest(self, nodes: np.ndarray, distances: np.ndarray, ring_m: float = 0.0) -> None:
         """What a kernel has found in passing."""
-        self._nearest[nodes.shape[1]] = nodes, distances
+        self._nearest[nodes.shape[1], ring_m] = nodes, distances
 
     def nearest_living(self) -> np.ndarray:
         """(B,) the living node nearest to the prediction; -1: none is alive."""
@@ -120,7 +126,7 @@ class View:
 
     def as_arrays(self) -> dict[str, np.ndarray]:
         """Fresh arrays of fixed shape, the content of the observation "view"."""
-        return {
+        arrays = {
             "period": self.period.astype(np.int64),
             "lam": self.lam[:, None].copy(),
             "luck": self.luck[:, None].astype(np.int64),
@@ -136,6 +142,7 @@ class View:
             "detected": self.detected.astype(np.int8),
             "measured": self.measured.copy(),
         }
+        return arrays | ({"bitmap": self.reports.bitmap.copy()} if self.reports.bitmap.shape[1] else {})
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, np.ndarray]) -> View:
@@ -161,7 +168,8 @@ class View:
         positions = np.ascontiguousarray(a["positions"], np.float64)
         geometry.index(positions, grid)
         network = Network(network_row, positions, a["battery"], members, grid)
-        return cls(row, belief, network, Reports(count, node, value))
+        bitmap = a.get("bitmap", np.zeros((rows, 0), np.int8))
+        return cls(row, belief, network, Reports(count, node, value, bitmap))
 
 
 def _mask(nodes: np.ndarray, count: np.ndarray) -> np.ndarray:

@@ -47,7 +47,8 @@ class World:
 
     def allocate(self, rows: int) -> State:
         """Arrays for `restart` to begin episodes in."""
-        return State.zeros(rows, self.scenario.field.nodes, self.scenario.periods, self.tracker.particles)
+        s = self.scenario
+        return State.zeros(rows, s.field.nodes, s.periods, self.tracker.particles, s.binary)
 
     def restart(self, state: State, rows, keys, donate: bool = False) -> tuple[State, Outcome]:
         """New episodes in some rows of a batch; the others stay, but for the ledger of their last period.

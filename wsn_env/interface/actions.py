@@ -25,7 +25,7 @@ class MenuAction:
         if candidates <= MENU_MEMBERS:
             raise ValueError(f"candidates = {candidates}: the menu needs at least {MENU_MEMBERS + 1}")
         self.space = spaces.Discrete(1 + 2 * (MENU_MEMBERS + 1))
-        self._order, self._candidates = order, candidates
+        self._order, self._candidates, self._ring_m = order, candidates, scenario.ring_m
         self._constants = constants(scenario)
 
     def cluster(self, action, view: View) -> Cluster:
@@ -40,7 +40,7 @@ class MenuAction:
 
     def _ordered(self, actions, view: View) -> np.ndarray:
         """(B, K) candidates in order of merit, -1 at the end."""
-        nodes = view.nearest(self._candidates)[0]
+        nodes = view.nearest(self._candidates, self._ring_m)[0]
         if self._order == "nearest":
             return nodes
         ordered, kept = np.empty_like(nodes), np.where(_moves.py_func(actions, view.head), -1, view.head)
@@ -49,7 +49,7 @@ class MenuAction:
 
     def masks(self, view: View) -> np.ndarray:
         """(B, 19) bool: what differs from all smaller entries; counts beyond the living, or keeping no head, do not."""
-        living = (view.nearest(self._candidates)[0] >= 0).sum(axis=1)
+        living = (view.nearest(self._candidates, self._ring_m)[0] >= 0).sum(axis=1)
         n = np.arange(MENU_MEMBERS + 1)
         standing = view.head >= 0
         valid = np.ones((len(living), self.space.n), dtype=bool)
@@ -98,19 +98,19 @@ class SubsetAction:
 
     def __init__(self, scenario: Scenario, order: str, candidates: int):
         self.space = spaces.MultiDiscrete([candidates + 1] + [2] * candidates)
-        self._candidates = candidates
+        self._candidates, self._ring_m = candidates, scenario.ring_m
 
     def cluster(self, action, view: View) -> Cluster:
         """The cluster that the entries name."""
         action = _in_range(action, self.space, len(view.row))
-        nodes = view.nearest(self._candidates)[0]
+        nodes = view.nearest(self._candidates, self._ring_m)[0]
         named = np.take_along_axis(nodes, np.maximum(action[:, :1] - 1, 0), axis=1)[:, 0]
         head = np.where(action[:, 0] == 0, view.head, named)
         return Cluster(head, np.where(action[:, 1:] == 1, nodes, -1).astype(np.int32))
 
     def masks(self, view: View) -> np.ndarray:
         """(B, K + 1 + 2 K) bool: heads, then out/in for each candidate."""
-        exists = view.nearest(self._candidates)[0] >= 0
+        exists = view.nearest(self._candidates, self._ring_m)[0] >= 0
         keep = (view.head >= 0) | ~exists.any(axis=1)
         choice = np.stack([np.ones_like(exists), exists], axis=2).reshape(len(exists), -1)
         return np.concatenate([keep[:, None], exists, choice], axis=1)

@@ -4,8 +4,10 @@ import numpy as np
 
 from wsn_env.compiling import kernel, lean_piece
 from wsn_env.physics.field import squared_distance
-from wsn_env.physics.sensing import detection_piece, strength
+from wsn_env.numerics import exp, normal_cdf
+from wsn_env.physics.sensing import BINARY, detection_piece, strength
 
+TWO_PI = 6.283185307179586
 ORDERS = ("nearest", "information")
 
 
@@ -38,6 +40,11 @@ def gain(detection, positions, node, mean, cov, p00, p01, p11, c):
         return p00 + p11 - q00 - q11, q00, q01, q11
     dx = mean[0] - positions[node, 0]
     dy = mean[2] - positions[node, 1]
+    if c.model == BINARY:
+        h0, h1, r = _edge(dx, dy, cov, c)
+        b0, b1 = p00 * h0 + p01 * h1, p01 * h0 + p11 * h1
+        s = h0 * b0 + h1 * b1 + r
+        return (b0 * b0 + b1 * b1) / s, p00 - b0 * b0 / s, p01 - b0 * b1 / s, p11 - b1 * b1 / s
     # The slope of the strength, smoothed over the belief's own width.
     squared = max(dx * dx + dy * dy + 0.5 * (cov[0, 0] + cov[2, 2]), c.floor_m * c.floor_m)
     slope = -2.0 * c.slope / squared
@@ -47,6 +54,26 @@ def gain(detection, positions, node, mean, cov, p00, p01, p11, c):
     b0, b1 = p00 * h0 + p01 * h1, p01 * h0 + p11 * h1
     s = h0 * b0 + h1 * b1 + r
     return (b0 * b0 + b1 * b1) / s, p00 - b0 * b0 / s, p01 - b0 * b1 / s, p11 - b1 * b1 / s
+
+
+@lean_piece
+def _edge(dx, dy, cov, c):
+    """One bit as a linear measurement: its direction, and the noise that leaves the same expected variance.
+
+    A normal x of variance v that is only known to lie on one side of a threshold t sds from its mean keeps, on average,
+    v (1 - phi(t)^2 / (Phi(t) Phi(-t))).
+
+    Args:
+        dx, dy: from the node to the mean [m].
+    """
+    distance = max(np.sqrt(dx * dx + dy * dy), 1e-9)
+    h0, h1 = dx / distance, dy / distance
+    along = max(h0 * h0 * cov[0, 0] + 2.0 * h0 * h1 * cov[0, 2] + h1 * h1 * cov[2, 2], 1e-12)
+    blurred = along + c.edge_m * c.edge_m
+    t = min(abs(c.radius_m - distance) / np.sqrt(blurred), 8.0)
+    below = normal_cdf(-t)
+    told = exp(-t * t) / (TWO_PI * below * (1.0 - below)) * along / blurred
+    return h0, h1, along * (1.0 - told) / max(told, 1e-12)
 
 
 @kernel

@@ -9,7 +9,7 @@ from wsn_env.compiling import lean_kernel, lean_piece, over_rows, threads_for
 from wsn_env.interface.merit import gain, mean_detection
 from wsn_env.numerics import log
 from wsn_env.physics.constants import constants
-from wsn_env.physics.field import nearest_candidates, squared_distance
+from wsn_env.physics.field import find_candidates, squared_distance
 from wsn_env.physics.sensing import detection_piece
 from wsn_env.quantity import suggest
 from wsn_env.scenario import Scenario
@@ -61,7 +61,7 @@ def _encode(start, stop, cs, battery_j, which, nodes, distances, out, rows, beli
         if not which[b]:
             continue
         m, p, head = beliefs[b].predicted_mean, beliefs[b].predicted_cov, network.row[b].head
-        nearest_candidates(network, b, m[0], m[2], nodes[b], distances[b])
+        find_candidates(network, b, m[0], m[2], c.ring_m, nodes[b], distances[b])
         positions, members, n = network.positions[b], network.members[b], network.row[b].n_members
         f = out[b]
         f[:] = 0.0
@@ -151,11 +151,12 @@ class CandidatesObservation:
         self._threads = threads
         self._constants = constants(scenario)
         self._battery_j = scenario.radio.battery_j
+        self._ring_m = scenario.ring_m
 
     def encode(self, view: View) -> np.ndarray:
         """(B, n) float32, fresh."""
         rows, candidates = len(view.row), self.shape[0]
-        view.remember_nearest(np.empty((rows, candidates), np.int64), np.empty((rows, candidates)))
+        view.remember_nearest(np.empty((rows, candidates), np.int64), np.empty((rows, candidates)), self._ring_m)
         return self._fill(np.empty((rows, *self.space.shape), np.float32), view, np.ones(rows, bool))
 
     def renew(self, view: View, rows, before: View, last) -> np.ndarray:
@@ -164,11 +165,11 @@ class CandidatesObservation:
         Args:
             rows: (B,) bool, which have changed since `last` was encoded from the view `before`.
         """
-        view.remember_nearest(*(array.copy() for array in before.nearest(self.shape[0])))
+        view.remember_nearest(*(array.copy() for array in before.nearest(self.shape[0], self._ring_m)), self._ring_m)
         return self._fill(last.copy(), view, rows)
 
     def _fill(self, out, view: View, rows):
-        filled, seen = (*view.nearest(self.shape[0]), out), (view.row, view.belief, view.reports.count)
+        filled, seen = (*view.nearest(self.shape[0], self._ring_m), out), (view.row, view.belief, view.reports.count)
         numbers = self._constants, self._battery_j
         threads = threads_for(rows, self._threads)
         over_rows(_encode, len(rows), threads, *numbers, rows, *filled, *seen, *view.network.arrays())
@@ -229,6 +230,7 @@ class ViewObservation:
                 "detected": spaces.Box(0, 1, (nodes,), np.int8),
                 "measured": box(-far, far, nodes, 2),
             }
+            | ({"bitmap": spaces.Box(0, 1, (nodes,), np.int8)} if scenario.binary else {})
         )
 
     def encode(self, view: View) -> dict[str, np.ndarray]:

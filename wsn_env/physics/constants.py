@@ -5,7 +5,9 @@ import math
 import numpy as np
 
 from wsn_env.scenario import Scenario
-from wsn_env.sections import Position, Rssi
+from wsn_env.sections import Binary, Position, Rssi
+
+RECEIVERS = ("head", "sink", "target")
 
 CONSTANTS = np.dtype(
     [
@@ -19,12 +21,18 @@ CONSTANTS = np.dtype(
         ("ceiling", "f8"),
         ("decay_power", "f8"),
         ("edge_power", "f8"),
-        # measurement: 0 position, 1 strength in dB, 2 power
+        # measurement: 0 position, 1 strength in dB, 2 power, 4 one bit
         ("model", "i8"),
         ("level", "f8"),
         ("slope", "f8"),
         ("noise", "f8"),
         ("floor_m", "f8"),
+        # binary sensors
+        ("flip", "f8"),
+        ("edge_m", "f8"),
+        ("every_presence", "i8"),
+        ("refresh", "i8"),
+        ("ring_m", "f8"),
         # radio, eq. 5
         ("tx_j_per_bit", "f8"),
         ("amplifier_j_per_bit_m2", "f8"),
@@ -37,6 +45,7 @@ CONSTANTS = np.dtype(
         ("packet_success", "f8"),
         ("tries", "i8"),
         ("delivery", "f8"),
+        ("receiver", "i8"),  # its place in RECEIVERS
         ("sensing_j", "f8"),
         # tracking
         ("q", "f8"),
@@ -56,10 +65,13 @@ def constants(scenario: Scenario) -> np.ndarray:
     A strength model is `level - slope ln(max(d, floor)^2)` in dB, or `level exp(-slope ln(max(d, floor)^2))` in power.
     """
     d, m, r, t = scenario.detection, scenario.measurement, scenario.radio, scenario.tracking
+    bit = m if isinstance(m, Binary) else Binary()
     if isinstance(m, Position):
         level, slope, noise, floor = 0.0, 0.0, m.noise_m, 0.0
     elif isinstance(m, Rssi):
         level, slope, noise, floor = m.reference_dbm, 5 * m.exponent / math.log(10), m.noise_db, m.floor_m
+    elif isinstance(m, Binary):
+        level, slope, noise, floor = 0.0, 0.0, m.edge_m, 0.0
     else:
         level, slope, noise, floor = m.amplitude, m.exponent / 2, m.noise, m.floor_m
     record = np.zeros(1, CONSTANTS)
@@ -78,6 +90,11 @@ def constants(scenario: Scenario) -> np.ndarray:
         slope=slope,
         noise=noise,
         floor_m=floor,
+        flip=bit.flip if scenario.binary else 0.0,
+        edge_m=bit.edge_m,
+        every_presence=bit.reports == "presence",
+        refresh=bit.refresh,
+        ring_m=scenario.ring_m,
         tx_j_per_bit=1e-9 * r.tx_nj_per_bit,
         amplifier_j_per_bit_m2=1e-12 * r.amplifier_pj_per_bit_m2,
         rx_j_per_bit=1e-9 * r.rx_nj_per_bit,
@@ -89,6 +106,7 @@ def constants(scenario: Scenario) -> np.ndarray:
         packet_success=r.packet_success,
         tries=1 + r.retries,
         delivery=r.delivery,
+        receiver=RECEIVERS.index(r.receiver),
         sensing_j=1e-9 * r.sensing_nj,
         q=scenario.filter_q,
         pooled=t.fusion == "pooled",

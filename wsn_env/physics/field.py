@@ -131,10 +131,39 @@ def _beyond(ring, column, line, x, y, place):
     return nearest
 
 
+@lean_piece
+def ring_candidates(network, b, x, y, ring_m, nodes, distances):
+    """The K living nodes of row b nearest to a ring of this radius [m] about (x, y), in order of that; the lower index
+    wins a tie. Looks at all nodes.
+
+    Args:
+        nodes, distances: as for `nearest_candidates`; distances are to the point.
+    """
+    positions, battery = network.positions[b], network.battery[b]
+    nodes[:] = -1
+    distances[:] = np.inf
+    for node in range(len(battery)):
+        offset = np.sqrt(squared_distance(positions, node, x, y)) - ring_m
+        if battery[node] > 0.0 and offset * offset <= distances[-1]:
+            _insert(node, offset * offset, nodes, distances)
+    for k in range(len(nodes)):
+        if nodes[k] >= 0:
+            distances[k] = np.sqrt(squared_distance(positions, nodes[k], x, y))
+
+
 @lean_kernel
-def _nearest_rows(start, stop, network, points, nodes, distances):
+def _nearest_rows(start, stop, network, points, ring_m, nodes, distances):
     for b in range(start, stop):
-        nearest_candidates(network, b, points[b, 0], points[b, 1], nodes[b], distances[b])
+        find_candidates(network, b, points[b, 0], points[b, 1], ring_m, nodes[b], distances[b])
+
+
+@lean_piece
+def find_candidates(network, b, x, y, ring_m, nodes, distances):
+    """`nearest_candidates` for a ring of radius 0, else `ring_candidates`."""
+    if ring_m > 0.0:
+        ring_candidates(network, b, x, y, ring_m, nodes, distances)
+    else:
+        nearest_candidates(network, b, x, y, nodes, distances)
 
 
 @lean_kernel
@@ -148,20 +177,21 @@ def index(positions, grid) -> None:
     _index_rows(0, len(positions), positions, grid)
 
 
-def nearest(network, points, count: int, threads: int = 1):
-    """The living nodes nearest to a point, for every row.
+def nearest(network, points, count: int, ring_m: float = 0.0, threads: int = 1):
+    """The living nodes nearest to a point, or to a ring about it, for every row.
 
     Args:
         network: with its grid.
         points: (B, 2) m.
         count: K.
+        ring_m: radius of the ring; 0: the point itself.
 
-    Returns: (B, K) indices in order of distance, -1 where fewer are alive; (B, K) distances in m, inf there.
+    Returns: (B, K) indices in order of nearness, -1 where fewer are alive; (B, K) distances to the point in m, inf there.
     """
     rows = len(points)
     nodes, distances = np.empty((rows, count), np.int64), np.empty((rows, count))
     points = np.ascontiguousarray(points, np.float64)
-    over_rows(_nearest_rows, rows, threads, network, points, nodes, distances)
+    over_rows(_nearest_rows, rows, threads, network, points, float(ring_m), nodes, distances)
     return nodes, distances
 
 

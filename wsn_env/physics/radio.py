@@ -1,14 +1,18 @@
 """What talking costs: sender and receiver pay for every try, a node gives no more than it has.
 
-Reports may be lost and are tried again (assumption d of Xiang & Guo, 2013); control packets always arrive. All pieces
-work on row b of the state and of the period's outcome.
+Reports may be lost and are tried again (assumption d of Xiang & Guo, 2013); control packets always arrive. A sink in the
+middle of the field and the target's own node have energy of their own, so that only the network's side is on the books:
+who reports to them pays for sending, who is called by them pays for hearing it. All pieces work on row b of the state
+and of the period's outcome.
 """
 
 from wsn_env import draws
 from wsn_env.compiling import lean_piece
+from wsn_env.physics.constants import RECEIVERS
 from wsn_env.physics.field import squared_distance
 
 SENSING, HANDOVER, INVITATION, REPORT, BROADCAST, SEARCH = range(6)
+TO_HEAD, TO_SINK, TO_TARGET = range(len(RECEIVERS))
 
 
 @lean_piece
@@ -53,14 +57,27 @@ def send(sender, receiver, bits, purpose, state, outcome, b, c):
 
 
 @lean_piece
-def report(node, head, purpose, state, outcome, b, c):
-    """A member's report with its retries. Returns whether the head has it; the head's own is free."""
-    if node == head:
-        return True
+def send_out(sender, x, y, bits, purpose, state, outcome, b, c):
+    """One packet from a node to (x, y), out of the network (eq. 5). Returns whether the node could pay."""
+    squared = squared_distance(state.network.positions[b], sender, x, y)
+    living = state.network.battery[b, sender] > 0.0
+    return living and spend(sender, transmission(bits, squared, c), purpose, state, outcome, b)
+
+
+@lean_piece
+def report(node, head, target, purpose, state, outcome, b, c):
+    """A node's report with its retries. Returns whether it was received; to the head its own is free."""
+    if c.receiver == TO_HEAD and (node == head or state.network.battery[b, head] <= 0.0):
+        return node == head and state.network.battery[b, head] > 0.0
+    x, y = target if c.receiver == TO_TARGET else (0.5 * c.side_m, 0.5 * c.side_m)
     packet = draws.SEARCH_PACKET if purpose == SEARCH else draws.PACKET
     stream = draws.stream(state.key[b], state.row[b].period, packet)
     for attempt in range(c.tries):
-        if not send(node, head, c.report_bits, purpose, state, outcome, b, c):
+        if c.receiver == TO_HEAD:
+            sent = send(node, head, c.report_bits, purpose, state, outcome, b, c)
+        else:
+            sent = send_out(node, x, y, c.report_bits, purpose, state, outcome, b, c)
+        if not sent:
             return False
         if draws.uniform(stream, 16 * node + attempt) < c.packet_success:
             return True
@@ -90,7 +107,8 @@ def broadcast(state, outcome, b, c):
 def form(head, chosen, count, state, outcome, b, c):
     """Make the chosen cluster the standing one: handover from the old head, invitations to new members.
 
-    Only members that hear their invitation join.
+    Only members that hear their invitation join. Where a sink or the target receives, the head is a node like the
+    others: nothing is handed over, and who was awake before need not be called.
 
     Args:
         head: the new head, alive.
@@ -101,6 +119,8 @@ def form(head, chosen, count, state, outcome, b, c):
     standing, members = state.network.row[b], state.network.members[b]
     old, old_count = standing.head, standing.n_members
     changed = old != head
+    if c.receiver != TO_HEAD:
+        return _call(head, chosen, count, state, outcome, b, c)
     handed = changed and old >= 0 and send(old, head, c.handover_bits, HANDOVER, state, outcome, b, c)
     n, j = 0, 0
     for k in range(count):
@@ -116,3 +136,29 @@ def form(head, chosen, count, state, outcome, b, c):
     standing.head = head
     standing.n_members = n
     return handed
+
+
+@lean_piece
+def _call(head, chosen, count, state, outcome, b, c):
+    """`form` where a sink or the target receives. Returns False: no role changes hands."""
+    standing, members = state.network.row[b], state.network.members[b]
+    old, old_count = standing.head, standing.n_members
+    price = c.invitation_bits * c.rx_j_per_bit
+    slept = head != old
+    for k in range(old_count):
+        slept &= members[k] != head
+    if slept:
+        spend(head, price, INVITATION, state, outcome, b)
+    n, j = 0, 0
+    for k in range(count):
+        node = chosen[k]
+        while j < old_count and members[j] < node:
+            j += 1
+        if node == old or (j < old_count and members[j] == node) or spend(node, price, INVITATION, state, outcome, b):
+            chosen[n] = node
+            n += 1
+    for k in range(n):
+        members[k] = chosen[k]
+    standing.head = head
+    standing.n_members = n
+    return False

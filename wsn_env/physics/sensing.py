@@ -10,7 +10,10 @@ from wsn_env.compiling import lean_kernel, lean_piece
 from wsn_env.numerics import exp, log
 from wsn_env.physics.constants import CONSTANTS
 from wsn_env.physics.field import squared_distance
-from wsn_env.sections import Detection
+from wsn_env.sections import Binary, Detection, Position
+
+
+POSITION, BINARY = Position.code, Binary.code
 
 
 @lean_piece
@@ -75,6 +78,13 @@ def detects(key, period, node, distance, c):
     """Whether a node, if awake, detects the target in this period."""
     p = detection_piece(distance, c)
     return p > 0.0 and draws.uniform(draws.stream(key, period, draws.DETECTION), node) < p
+
+
+@lean_piece
+def tells(key, period, node, distance, c):
+    """Whether a node takes the target to be there: it detects, unless it misreads its one bit."""
+    misread = c.flip > 0.0 and draws.uniform(draws.stream(key, period, draws.MISREADING), node) < c.flip
+    return detects(key, period, node, distance, c) != misread
 
 
 @lean_piece

@@ -11,13 +11,14 @@ from wsn_env import draws
 from wsn_env.compiling import inline_piece, kernel, lean_kernel, lean_piece, piece
 from wsn_env.draws import normal_pair32
 from wsn_env.numerics import F, exp, exp32, expm1_32, f32_bits, f32_from_bits, log, log32
+from wsn_env.sections import Binary, Position, Rssi, RssiPower
 from wsn_env.types import Belief, Reports, network_of
 
 LANES = 16
 BLOCK = 8  # particles whose weights are summed apart when resampling
 REACH = 16  # slots of the running maximum's widest window
 SUMS = 16  # w, w^2, four of w d, ten of w d d'
-POSITION, STRENGTH, POWER = range(3)
+POSITION, STRENGTH, POWER, BINARY = Position.code, Rssi.code, RssiPower.code, Binary.code
 LOG_LEAST, LOG_MOST = F(-13.815510558), F(-1.0000005e-6)  # p in [1e-6, 1 - 1e-6]: no report rules a particle out
 TINY = F(1e-30)
 
@@ -134,6 +135,63 @@ def weigh_silence(x, log_weights, position, delivery, c):
         dy = py[i] - sy
         unseen = -expm1_32(log_detection32(dx * dx + dy * dy, curve))
         log_weights[i] += log32(min(lost + sent * unseen, F(1)))  # <= 0, as log weights have to be
+
+
+@lean_piece
+def weigh_states(x, log_weights, network, bitmap, b, c):
+    """Add to every particle the log probability of the awake nodes' states as the bitmap (S,) has them: a silent node
+    tells as much as one that reports.
+
+    Nodes whose edge is far from every particle tell all of them the same and are left out.
+    """
+    positions, battery, standing = network.positions[b], network.battery[b], network.row[b]
+    if standing.head < 0:
+        return
+    box = _bounds(x[0]), _bounds(x[2])
+    far = 16.0 * c.edge_m
+    for k in range(-1, standing.n_members):
+        node = standing.head if k < 0 else network.members[b, k]
+        nearest, farthest = _reach(positions[node], box)
+        if battery[node] > 0.0 and nearest < c.radius_m + far and farthest > c.radius_m - far:
+            weigh_state(x, log_weights, positions[node], bitmap[node] != 0, c)
+
+
+@lean_piece
+def _bounds(values):
+    low, high = values[0], values[0]
+    for value in values:
+        low, high = min(low, value), max(high, value)
+    return np.float64(low), np.float64(high)
+
+
+@lean_piece
+def _reach(position, box):
+    """Distances of the nearest and the farthest point of a box [m]."""
+    nearest, farthest = 0.0, 0.0
+    for axis in range(2):
+        below, above = box[axis][0] - position[axis], position[axis] - box[axis][1]
+        nearest += max(below, above, 0.0) ** 2
+        farthest += max(abs(below), abs(above)) ** 2
+    return np.sqrt(nearest), np.sqrt(farthest)
+
+
+@lean_piece
+def weigh_state(x, log_weights, position, detects, c):
+    """Add to every particle the log probability of the state of the binary sensor at `position`.
+
+    P(1) = f + (1 - 2 f) / (1 + exp((d - R) / s)), f the probability of a misreading and s the softness of the edge.
+    """
+    px, py = x[0], x[2]
+    sx, sy = F(position[0]), F(position[1])
+    flip = max(c.flip, 1e-6)  # no state rules a particle out
+    least, rest = F(flip), F(1.0 - 2.0 * flip)
+    slope = F((-1.0 if detects else 1.0) / c.edge_m)
+    radius = F(c.radius_m)
+    for i in range(x.shape[1]):
+        dx = px[i] - sx
+        dy = py[i] - sy
+        y = slope * (radius - np.sqrt(dx * dx + dy * dy))
+        log_weights[i] += log32(least + rest / (F(1) + exp32(min(y, F(80)))))
 
 
 @lean_piece
@@ -347,6 +405,9 @@ def filter_row(key, period, belief, network, reports, b, c, room):
     weights, slots, states = room
     n, count = x.shape[1], reports.count[b]
     predict(draws.stream(key, period, draws.PROCESS), x, c.period_s, c.q)
+    if c.model == BINARY:
+        weigh_states(x, log_weights, network, reports.bitmap[b], b, c)
+        count = 0
     for j in range(count):
         position, value = network.positions[b, reports.node[b, j]], reports.value[b, j]
         if c.pooled:
@@ -375,7 +436,7 @@ def scratch(particles):
 @kernel
 def filter_rows(start, stop, constants, keys, periods, resampled, *arrays):
     """One period of the filter alone; `arrays` are the belief's, the reports' and the network's."""
-    belief, reports, network = Belief(*arrays[:3]), Reports(*arrays[3:6]), network_of(arrays[6:])
+    belief, reports, network = Belief(*arrays[:3]), Reports(*arrays[3:7]), network_of(arrays[7:])
     room = scratch(belief.particles.shape[2])
     for b in range(start, stop):
         resampled[b] = filter_row(keys[b], periods[b], belief, network, reports, b, constants[0], room)
