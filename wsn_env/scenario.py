@@ -169,7 +169,7 @@ PRESETS = {
     "Binary-v0": Scenario(
         name="Binary-v0",
         periods=50,
-        lam=0.5,
+        lam=2.0,
         field=Field(nodes=600, side_m=500.0),
         motion=Crossing(margin_m=60.0, crossing_m=250.0, acceleration_ms2=0.1),
         detection=Detection(radius_m=60.0, softness=1e-6, ceiling=1.0),
@@ -179,7 +179,7 @@ PRESETS = {
     ),
     "Anchors-v0": Scenario(
         name="Anchors-v0",
-        lam=4.0,
+        lam=3.0,
         periods=50,
         field=Field(side_m=200.0, positions=RING_OF_EIGHT),
         motion=Crossing(margin_m=20.0, crossing_m=80.0, acceleration_ms2=0.5),

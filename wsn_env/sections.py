@@ -256,8 +256,8 @@ class Radio(Section):
     retries: int = quantity(3, "further tries of a lost report", at_least=0, at_most=15, whole=True)
     receiver: str = quantity(
         "head",
-        "who hears the awake nodes: the cluster's head; a sink on mains in the middle of the field; or the target, whose"
-        " own node hears their beacons",
+        "who hears the awake nodes: the cluster's head; a sink on mains in the middle of the field; the target's own"
+        " node, which hears their beacons",
         choices=("head", "sink", "target"),
     )
     sensing_nj: float = quantity(0.0, "energy of an awake node's sensing, per period", at_least=0)
