@@ -1,6 +1,6 @@
 """Train a PPO scheduler, then compare it with every baseline on episodes that neither has seen.
 
-    python train.py --lam 4
+    python train.py --scenario PreDC-v0 --lam 4
 
 Reads top to bottom: settings -> environment -> PPO -> saved policy -> paired comparison -> picture.
 """
@@ -43,8 +43,8 @@ class Training:
     # what is trained
     scenario: str = "PreDC-v0"
     """Scenario id."""
-    lam: float = 4.0
-    """Trade-off between error and energy [m/mJ]."""
+    lam: float | None = None
+    """Trade-off between error and energy [m/mJ]; left out: the scenario's."""
     tracks: list[Path] = field(default_factory=list)
     """CSV files of recorded motion (columns t, x, y in s and m), to train and compare on instead of the scenario's."""
     set: list[str] = field(default_factory=list)
@@ -120,13 +120,15 @@ def main() -> int:
 
 def train(settings: Training) -> None:
     """The whole story."""
+    if settings.lam is None:
+        settings.lam = make_scenario(settings.scenario, settings.set, settings.tracks).lam_range[0]
     check(settings)
     torch.set_num_threads(settings.torch_threads)
     scenario = make_scenario(settings.scenario, settings.set, settings.tracks, lam=settings.lam)
     speaks = Settings(reward=settings.reward, order=settings.order)
     envs = ClusterVectorEnv(settings.rows, scenario, autoreset_mode="Disabled", **asdict(speaks))
     folder = open_folder(settings)
-    adapted = SB3VecEnv(envs, lam_scale=0.3, stagger=True)
+    adapted = SB3VecEnv(envs, scaled=True, stagger=True)
     model = make_model(settings, VecMonitor(adapted), folder)
     left = settings.steps - model.num_timesteps
     if left > 0:

@@ -20,12 +20,13 @@ class SB3VecEnv(VecEnv):
 
     Args:
         envs: in same-step or disabled autoreset mode. Next-step's extra reset row is no transition: it is refused.
-        lam_scale: rewards are divided by 1 + lam_scale * lam, so that their size is alike for every lam.
+        scaled: rewards are divided by the cost of a period that the scenario calls typical, so that their size is
+            alike for every scenario and lam.
         stagger: let the rows' first episodes end early, evenly spread, as truncations: later resets stay spread.
             Disabled mode only.
     """
 
-    def __init__(self, envs: ClusterVectorEnv, lam_scale: float = 0.0, stagger: bool = False):
+    def __init__(self, envs: ClusterVectorEnv, scaled: bool = False, stagger: bool = False):
         if envs.autoreset_mode == AutoresetMode.NEXT_STEP:
             raise ValueError("autoreset_mode NextStep makes rows that are no transitions: use SameStep or Disabled")
         if stagger and envs.autoreset_mode != AutoresetMode.DISABLED:
@@ -33,7 +34,7 @@ class SB3VecEnv(VecEnv):
         self.envs = envs
         self.seconds = 0.0  # wall time spent in step and reset
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
-        self._lam_scale = lam_scale
+        self._scaled = scaled
         self._first_end = np.full(envs.num_envs, -1)
         if stagger:
             self._first_end = 1 + np.arange(envs.num_envs) * envs.scenario.periods // envs.num_envs
@@ -78,7 +79,12 @@ class SB3VecEnv(VecEnv):
             if not same_step:
                 observation, _ = self.envs.reset(options={"reset_mask": done})
         # A copy in float32: stable-baselines3 adds the bootstrapped value in place.
-        return observation, (rewards / (1 + self._lam_scale * lam)).astype(np.float32), done, infos
+        return observation, (rewards / self._scale(lam)).astype(np.float32), done, infos
+
+    def _scale(self, lam: np.ndarray) -> np.ndarray:
+        scenario = self.envs.scenario
+        cost = scenario.typical_error_m + scenario.typical_energy_mj * lam
+        return cost if self._scaled else np.ones_like(cost)
 
     def close(self) -> None:
         """Close the environments."""

@@ -64,10 +64,10 @@ def test_staggered_rows_end_at_different_times():
     assert (ends.sum(axis=1) == 1).all() and (ends.sum(axis=0) == 4).all()
 
 
-def test_lam_scale_and_wrappers():
+def test_scaled_rewards_and_wrappers():
     rows = 3
     plain = SB3VecEnv(ClusterVectorEnv(rows, lam=4.0, autoreset_mode="SameStep", **SMALL))
-    scaled = SB3VecEnv(ClusterVectorEnv(rows, lam=4.0, autoreset_mode="SameStep", **SMALL), lam_scale=0.3)
+    scaled = SB3VecEnv(ClusterVectorEnv(rows, lam=4.0, autoreset_mode="SameStep", **SMALL), scaled=True)
     stacked = VecFrameStack(SB3VecEnv(ClusterVectorEnv(rows, autoreset_mode="SameStep", **SMALL)), 2)
     for envs in (plain, scaled, stacked):
         envs.seed(0)

@@ -44,6 +44,8 @@ class Scenario(Section):
     periods: int = quantity(100, "horizon of an episode", at_least=1, whole=True)
     period_s: float = quantity(1.0, "sampling period T", above=0, at_most=3600)
     lam: float | tuple[float, float] = 4.0  # m/mJ; a pair (low, high): drawn log-uniformly for each episode
+    typical_error_m: float = quantity(1.0, "error of a good schedule: the scale of a learner's rewards", above=0)
+    typical_energy_mj: float = quantity(0.3, "its energy in a period", at_least=0)
     field: Field = Field()
     motion: Motion = Crossing()
     detection: Detection = Detection()
@@ -170,6 +172,7 @@ PRESETS = {
         name="Binary-v0",
         periods=50,
         lam=2.0,
+        typical_error_m=1.5,
         field=Field(nodes=600, side_m=500.0),
         motion=Crossing(margin_m=60.0, crossing_m=250.0, acceleration_ms2=0.1),
         detection=Detection(radius_m=60.0, softness=1e-6, ceiling=1.0),
@@ -180,6 +183,8 @@ PRESETS = {
     "Anchors-v0": Scenario(
         name="Anchors-v0",
         lam=3.0,
+        typical_error_m=10.0,
+        typical_energy_mj=0.7,
         periods=50,
         field=Field(side_m=200.0, positions=RING_OF_EIGHT),
         motion=Crossing(margin_m=20.0, crossing_m=80.0, acceleration_ms2=0.5),
