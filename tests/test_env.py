@@ -122,6 +122,23 @@ def test_reward_is_minus_error_and_energy():
     assert info["episode_rms_m"] == pytest.approx((squares / SMALL["periods"]) ** 0.5)
 
 
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_antnp_is_the_mean_number_of_reporting_nodes(mode):
+    env = ClusterEnv("Binary-v0", particles=50, periods=12)
+    env.reset(seed=4)
+    reporting = []
+    for _ in range(12):
+        *_, info = env.step(18)
+        reporting.append(info["detections"])
+    assert info["antnp"] == np.mean(reporting) > 0
+    envs = ClusterVectorEnv(2, "Binary-v0", particles=50, periods=12, autoreset_mode=mode)
+    envs.reset(seed=4)
+    for _ in range(12):
+        *_, infos = envs.step(np.full(2, 18))
+    last = infos["final_info"] if mode == "SameStep" else infos
+    assert last["antnp"][0] == info["antnp"]
+
+
 def test_belief_reward_turns_to_the_error_when_the_belief_is_wrong():
     env = ClusterEnv(
         reward="belief",

@@ -60,6 +60,7 @@ class ClusterEnv(gym.Env):
         self._view: View | None = None
         self._lam = 0.0
         self._squares = 0.0
+        self._detections = 0
 
     def reset(self, *, seed: int | None = None, options: dict | None = None):
         """A new episode: seed fixes field, track and every draw."""
@@ -69,6 +70,7 @@ class ClusterEnv(gym.Env):
         self._state, outcome = self.world.restart(state, [True], np.array([key]), donate=True)
         self._lam = self._state.lam.item()
         self._squares = 0.0
+        self._detections = 0
         return self._observe(), self._reward_and_info(outcome)[1]
 
     def step(self, action):
@@ -81,9 +83,11 @@ class ClusterEnv(gym.Env):
         self._state, outcome = self.world.step(self._state, cluster, donate=True)
         reward, info = self._reward_and_info(outcome)
         self._squares += info["error_m"] * info["error_m"]
+        self._detections += info["detections"]
         truncated = self._state.period.item() >= self.scenario.periods
         if truncated:
             info["episode_rms_m"] = math.sqrt(self._squares / self.scenario.periods)
+            info["antnp"] = self._detections / self.scenario.periods
         return self._observe(), reward, False, truncated, info
 
     def _reward_and_info(self, outcome: Outcome) -> tuple[float, dict[str, Any]]:

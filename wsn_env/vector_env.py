@@ -68,6 +68,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self._view: View | None = None
         self._last: Any = None  # observation
         self._squares = np.zeros(num_envs)
+        self._detections = np.zeros(num_envs, dtype=np.int64)
         self._ended = np.zeros(num_envs, dtype=bool)
 
     def reset(self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None):
@@ -109,6 +110,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             keys[i] = draws.episode_key(self._generators[i])
         self._state, outcome = self.world.restart(self._state, rows, keys, donate=True)
         self._squares[rows] = 0.0
+        self._detections[rows] = 0
         self._ended = self._ended & ~rows
         return outcome
 
@@ -126,6 +128,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self._state, outcome = self.world.step(self._state, cluster, donate=True)
         reward, info = self._reward_and_info(outcome)
         self._squares += outcome.error_m * outcome.error_m
+        self._detections += outcome.detections
         if begins:  # next-step mode: these rows only begin
             reward[anew] = 0.0
             first = self._restart(anew)
@@ -142,7 +145,8 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         return self._observe(), reward, terminated, truncated, infos
 
     def _episode_info(self) -> dict[str, np.ndarray]:
-        return {"episode_rms_m": np.sqrt(self._squares / self.scenario.periods)}
+        periods = self.scenario.periods
+        return {"episode_rms_m": np.sqrt(self._squares / periods), "antnp": self._detections / periods}
 
     def _same_step(self, reward, terminated, truncated, info):
         """Begin the ended rows within the step; their last observation and info go to final_obs and final_info."""

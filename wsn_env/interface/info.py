@@ -7,6 +7,7 @@ TOLD = (
     "error_m",
     "energy_mj",
     "members",
+    "detections",
     "delivered",
     "dropped",
     "handover",
