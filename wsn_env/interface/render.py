@@ -58,21 +58,25 @@ def frame(state: State, scenario: Scenario, row: int = 0) -> np.ndarray:
     if len(past) > 1:
         draw.line([pixel(x, y) for x, y in past[:, ::2]], fill=TRUTH, width=2)
 
-    head = network.head[row]
-    reporters = set(state.reports.node[row, : state.reports.count[row]].tolist())
+    head, target = network.head[row], state.track[row, min(state.period[row], scenario.periods), ::2]
+    middle = (scenario.field.side_m / 2, scenario.field.side_m / 2)
+    receivers = {"head": network.positions[row, head], "sink": middle, "target": target}
     if head >= 0:
-        hx, hy = network.positions[row, head]
-        for node in network.members[row, : network.n_members[row]]:
-            x, y = network.positions[row, node]
-            if node in reporters:
-                draw.line((*pixel(x, y), *pixel(hx, hy)), fill=REPORT, width=2)
-            disc(x, y, 5, fill=MEMBER)
-        disc(hx, hy, scenario.detection.radius_m * scale, outline=HEAD)
-        disc(hx, hy, 7, fill=HEAD)
+        receiver = receivers[scenario.radio.receiver]
+        for node in state.reports.node[row, : state.reports.count[row]]:
+            draw.line((*pixel(*network.positions[row, node]), *pixel(*receiver)), fill=REPORT, width=2)
+        for node in (head, *network.members[row, : network.n_members[row]]):
+            disc(*network.positions[row, node], 5, fill=MEMBER)
+        if scenario.radio.receiver == "head":
+            disc(*receiver, scenario.detection.radius_m * scale, outline=HEAD)
+        if scenario.radio.receiver != "target":
+            disc(*receiver, 7, fill=HEAD)
+    if scenario.binary:
+        disc(*belief.mean[row, ::2], scenario.ring_m * scale, outline=MEMBER)
     _cross(draw, *pixel(*belief.mean[row, ::2]), ESTIMATE)
-    disc(*state.track[row, min(state.period[row], scenario.periods), ::2], 5, outline=TRUTH, width=3)
+    disc(*target, 5, outline=TRUTH, width=3)
     legend = (
-        ("head", HEAD),
+        ("sink" if scenario.radio.receiver == "sink" else "head", HEAD),
         ("member", MEMBER),
         ("report", REPORT),
         ("particles", CLOUD),
