@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from wsn_env.quantity import NUMBERS, ScenarioError, Section, quantity, suggest
 from wsn_env.sections import (
+    DETECTIONS,
     MEASUREMENTS,
     MOTIONS,
+    RADIOS,
     Crossing,
+    Cruise,
     Detection,
     Field,
+    Link,
     Measurement,
+    Modem,
     Motion,
     Position,
     Radio,
     Rssi,
+    Sonar,
+    Threshold,
     Tracking,
 )
 
@@ -26,11 +34,12 @@ KINDS = {
     "name": (str,),
     "field": (Field,),
     "motion": tuple(MOTIONS.values()),
-    "detection": (Detection,),
+    "detection": tuple(DETECTIONS.values()),
     "measurement": tuple(MEASUREMENTS.values()),
-    "radio": (Radio,),
+    "radio": tuple(RADIOS.values()),
     "tracking": (Tracking,),
 }
+BY_NAME = {"motion": MOTIONS, "detection": DETECTIONS, "measurement": MEASUREMENTS, "radio": RADIOS}
 
 
 @dataclass(frozen=True)
@@ -43,9 +52,9 @@ class Scenario(Section):
     lam: float | tuple[float, float] = 4.0  # m/mJ; a pair (low, high): drawn log-uniformly for each episode
     field: Field = Field()
     motion: Motion = Crossing()
-    detection: Detection = Detection()
+    detection: Detection | Threshold = Detection()
     measurement: Measurement = Position()
-    radio: Radio = Radio()
+    radio: Link = Radio()
     tracking: Tracking = Tracking()
 
     def __post_init__(self):
@@ -57,6 +66,13 @@ class Scenario(Section):
         low, high = self.lam_range
         if not (np.isfinite([low, high]).all() and 0 <= low <= high) or (low == 0) != (high == 0):
             raise ScenarioError(f"Scenario.lam = {self.lam!r}: must be at least 0 m/mJ, or a pair 0 < low <= high")
+        if isinstance(self.detection, Threshold):
+            self.detection.check(self.measurement)
+        if isinstance(self.radio, Modem) and self.period_s < self.radio.report_s:
+            raise ScenarioError(
+                f"Scenario.period_s = {self.period_s}: must be at least {self.radio.report_s:.3g} s, until a report of"
+                f" {self.radio.report_bits} bits has arrived"
+            )
 
     @property
     def lam_range(self) -> tuple[float, float]:
@@ -70,6 +86,16 @@ class Scenario(Section):
     def filter_q(self) -> float:
         """The filter's acceleration noise [m/s^2]."""
         return self.motion.fitting_q if self.tracking.filter_q is None else self.tracking.filter_q
+
+    @cached_property
+    def radius_m(self) -> float:
+        """Sensing radius; with a threshold, where the mean level is at it."""
+        return self.detection.distances_m(self.measurement)[0]
+
+    @cached_property
+    def reach_m(self) -> float:
+        """From here on a node detects nothing (with a threshold, less than once in a million periods)."""
+        return self.detection.distances_m(self.measurement)[1]
 
     @property
     def handover_bits(self) -> int:
@@ -86,7 +112,7 @@ class Scenario(Section):
         """A preset, with overrides by quantity.
 
         Args:
-            name: "PreDC-v0" or "Rssi-v0", with or without "wsn_env/".
+            name: one of PRESETS, with or without "wsn_env/".
             overrides: as for `override`.
         """
         short = name.removeprefix("wsn_env/")
@@ -97,13 +123,13 @@ class Scenario(Section):
     def override(self, **changes) -> Scenario:
         """A copy with some quantities changed, whatever section they stand in.
 
-        Sections are given whole or, for motion and measurement, by name: `override(nodes=400, motion="sine",
+        Sections are given whole or, where there are several kinds, by name: `override(nodes=400, motion="sine",
         amplitude_m=20, tracker="ekf")`. An unknown keyword raises and suggests.
         """
         if changes.get("positions") is not None:
             changes.setdefault("nodes", Field.nodes)  # the positions tell how many
         whole = {}
-        for name, kinds in (("motion", MOTIONS), ("measurement", MEASUREMENTS)):
+        for name, kinds in BY_NAME.items():
             if isinstance(changes.get(name), str):
                 chosen = changes.pop(name)
                 if chosen not in kinds:
@@ -113,14 +139,13 @@ class Scenario(Section):
         for item in fields(self):
             if item.name in changes:
                 whole[item.name] = changes.pop(item.name)
-        scenario = replace(self, **whole)
-        for item in fields(scenario):
-            section = getattr(scenario, item.name)
+        for item in fields(self):
+            section = whole.get(item.name, getattr(self, item.name))
             if is_dataclass(section):
                 own = {part.name for part in fields(section)} & changes.keys()
                 if own:
-                    new = replace(section, **{key: changes.pop(key) for key in own})
-                    scenario = replace(scenario, **{item.name: new})
+                    whole[item.name] = replace(section, **{key: changes.pop(key) for key in own})
+        scenario = replace(self, **whole)  # once, since sections may only fit together after all changes
         if changes:
             name = next(iter(changes))
             raise ScenarioError(f"scenario has no quantity {name!r}: {suggest(name, scenario.quantities())}")
@@ -153,4 +178,21 @@ class Scenario(Section):
 PRESETS = {
     "PreDC-v0": Scenario(name="PreDC-v0"),
     "Rssi-v0": Scenario(name="Rssi-v0", measurement=Rssi()),
+    "Underwater-v0": Scenario(
+        name="Underwater-v0",
+        period_s=5.0,
+        lam=0.006,
+        field=Field(nodes=64, side_m=1000.0, layout="grid"),
+        motion=Cruise(),
+        detection=Threshold(),
+        measurement=Sonar(),
+        radio=Modem(),
+        tracking=Tracking(
+            particles=1000,
+            silent_information=True,
+            resampling="spread",
+            start_sd_m=20.0,
+            start_sd_ms=1.0,
+        ),
+    ),
 }

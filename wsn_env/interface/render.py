@@ -67,7 +67,7 @@ def frame(state: State, scenario: Scenario, row: int = 0) -> np.ndarray:
             if node in reporters:
                 draw.line((*pixel(x, y), *pixel(hx, hy)), fill=REPORT, width=2)
             disc(x, y, 5, fill=MEMBER)
-        disc(hx, hy, scenario.detection.radius_m * scale, outline=HEAD)
+        disc(hx, hy, scenario.radius_m * scale, outline=HEAD)
         disc(hx, hy, 7, fill=HEAD)
     _cross(draw, *pixel(*belief.mean[row, ::2]), ESTIMATE)
     disc(*state.track[row, min(state.period[row], scenario.periods), ::2], 5, outline=TRUTH, width=3)

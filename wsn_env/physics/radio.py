@@ -1,8 +1,11 @@
 """What talking costs: sender and receiver pay for every try, a node gives no more than it has.
 
-Reports may be lost and are tried again (assumption d of Xiang & Guo, 2013); control packets always arrive. All pieces
-work on row b of the state and of the period's outcome.
+A radio reaches every node at a price that grows with distance (eq. 5); a modem sends over one hop at one price. Reports
+may be lost and are tried again (assumption d of Xiang & Guo, 2013); control packets always arrive. All pieces work on
+row b of the state and of the period's outcome.
 """
+
+import numpy as np
 
 from wsn_env import draws
 from wsn_env.compiling import lean_piece
@@ -43,6 +46,12 @@ def transmission(bits, squared, c):
 
 
 @lean_piece
+def in_one_hop(node, other, positions, c):
+    """Whether a packet goes from node to node at once."""
+    return squared_distance(positions, node, positions[other, 0], positions[other, 1]) <= c.hop_m * c.hop_m
+
+
+@lean_piece
 def send(sender, receiver, bits, purpose, state, outcome, b, c):
     """One packet from node to node (eq. 5). Returns whether both could pay, so that it arrived if not lost."""
     positions, battery = state.network.positions[b], state.network.battery[b]
@@ -54,9 +63,14 @@ def send(sender, receiver, bits, purpose, state, outcome, b, c):
 
 @lean_piece
 def report(node, head, purpose, state, outcome, b, c):
-    """A member's report with its retries. Returns whether the head has it; the head's own is free."""
+    """A member's report with its retries. Returns whether the head has it; the head's own is free.
+
+    After a search the new head may lie beyond one hop, for a modem: then nothing is sent.
+    """
     if node == head:
         return True
+    if not in_one_hop(node, head, state.network.positions[b], c):
+        return False
     packet = draws.SEARCH_PACKET if purpose == SEARCH else draws.PACKET
     stream = draws.stream(state.key[b], state.row[b].period, packet)
     for attempt in range(c.tries):
@@ -87,6 +101,21 @@ def broadcast(state, outcome, b, c):
 
 
 @lean_piece
+def _hand_over(old, head, state, outcome, b, c):
+    """The old head's packet to the new one; beyond one hop it is relayed, each time at the old head's expense.
+
+    Returns: as `send`.
+    """
+    positions, battery = state.network.positions[b], state.network.battery[b]
+    squared = squared_distance(positions, old, positions[head, 0], positions[head, 1])
+    hops = max(np.ceil(np.sqrt(squared) / c.hop_m), 1.0)
+    sending = hops * transmission(c.handover_bits, squared, c)
+    if battery[old] <= 0.0 or not spend(old, sending, HANDOVER, state, outcome, b):
+        return False
+    return battery[head] > 0.0 and spend(head, c.handover_bits * c.rx_j_per_bit, HANDOVER, state, outcome, b)
+
+
+@lean_piece
 def form(head, chosen, count, state, outcome, b, c):
     """Make the chosen cluster the standing one: handover from the old head, invitations to new members.
 
@@ -101,7 +130,7 @@ def form(head, chosen, count, state, outcome, b, c):
     standing, members = state.network.row[b], state.network.members[b]
     old, old_count = standing.head, standing.n_members
     changed = old != head
-    handed = changed and old >= 0 and send(old, head, c.handover_bits, HANDOVER, state, outcome, b, c)
+    handed = changed and old >= 0 and _hand_over(old, head, state, outcome, b, c)
     n, j = 0, 0
     for k in range(count):
         node = chosen[k]

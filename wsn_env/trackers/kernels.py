@@ -10,13 +10,13 @@ from numba import int32
 from wsn_env import draws
 from wsn_env.compiling import inline_piece, kernel, lean_kernel, lean_piece, piece
 from wsn_env.draws import normal_pair32
-from wsn_env.numerics import F, exp, exp32, expm1_32, f32_bits, f32_from_bits, log, log32
-from wsn_env.trackers.resampling import REACH, resample
+from wsn_env.numerics import F, exp, exp32, expm1_32, f32_bits, f32_from_bits, log, log32, log_normal_cdf32
+from wsn_env.trackers.resampling import REACH, correlated, lower_root, resample, spread_copies
 from wsn_env.types import Belief, Reports, network_of
 
 LANES = 16
 SUMS = 16  # w, w^2, four of w d, ten of w d d'
-POSITION, STRENGTH, POWER = range(3)
+POSITION, STRENGTH, POWER, SONAR = range(4)
 LOG_LEAST, LOG_MOST = F(-13.815510558), F(-1.0000005e-6)  # p in [1e-6, 1 - 1e-6]: no report rules a particle out
 TINY = F(1e-30)
 
@@ -74,6 +74,14 @@ def weigh(x, log_weights, first, step, position, value, c):
             dy = py[i] - sy
             r = (z - level) + slope * log32(max(dx * dx + dy * dy, floor))
             log_weights[i] -= half_precision * (r * r)
+    elif c.model == SONAR:
+        absorption = F(c.absorption)
+        for i in range(first, n, step):
+            dx = px[i] - sx
+            dy = py[i] - sy
+            near = max(dx * dx + dy * dy, floor)
+            r = (z - level) + (slope * log32(near) + absorption * np.sqrt(near))
+            log_weights[i] -= half_precision * (r * r)
     else:
         log_floor = log32(floor)
         top = F(c.level * exp(-c.slope * np.float64(log_floor)) / c.noise)  # at the floor, the greatest there is
@@ -87,7 +95,7 @@ def weigh(x, log_weights, first, step, position, value, c):
 
 @lean_piece
 def weigh_awake(x, log_weights, network, nodes, b, c):
-    """Add what it tells that of the awake nodes of row b just `nodes` (m,) reported, whatever they measured.
+    """Add what it tells that of the awake nodes of row b just `nodes` (m,) reported, beside what they measured.
 
     The head's own report is always heard, a member's with probability `delivery`. A node without energy tells nothing.
     """
@@ -99,10 +107,14 @@ def weigh_awake(x, log_weights, network, nodes, b, c):
         reported = False
         for other in nodes:
             reported |= other == node
-        if reported:
+        delivery = 1.0 if k < 0 else c.delivery
+        if c.detection == 1:  # a report's value tells all; that it came adds nothing
+            if not reported and battery[node] > 0.0:
+                weigh_quiet(x, log_weights, positions[node], delivery, c)
+        elif reported:
             weigh_detection(x, log_weights, positions[node], c)
         elif battery[node] > 0.0:
-            weigh_silence(x, log_weights, positions[node], 1.0 if k < 0 else c.delivery, c)
+            weigh_silence(x, log_weights, positions[node], delivery, c)
 
 
 @lean_piece
@@ -133,6 +145,32 @@ def weigh_silence(x, log_weights, position, delivery, c):
         dy = py[i] - sy
         unseen = -expm1_32(log_detection32(dx * dx + dy * dy, curve))
         log_weights[i] += log32(min(lost + sent * unseen, F(1)))  # <= 0, as log weights have to be
+
+
+@lean_piece
+def weigh_quiet(x, log_weights, position, delivery, c):
+    """Add the log probability that nothing was heard of the awake node at `position`, with a threshold.
+
+        ln Phi((threshold - h(d)) / sigma)               delivery = 1: the level was below the threshold
+        ln(1 - delivery + delivery Phi(...))             else: or the report was lost
+
+    Args:
+        delivery: probability that a report of the node arrives; 1 for the head.
+    """
+    px, py = x[0], x[2]
+    sx, sy = F(position[0]), F(position[1])
+    per_sd = 1.0 / max(c.noise, 1e-10)
+    below = F((c.threshold_db - c.level) * per_sd)
+    slope, absorption, floor = F(c.slope * per_sd), F(c.absorption * per_sd), F(max(c.floor_m * c.floor_m, 1e-12))
+    sent, lost = F(delivery), F(1.0 - delivery)
+    for i in range(x.shape[1]):
+        dx = px[i] - sx
+        dy = py[i] - sy
+        near = max(dx * dx + dy * dy, floor)
+        quiet = log_normal_cdf32(below + (slope * log32(near) + absorption * np.sqrt(near)))
+        if lost > F(0):
+            quiet = log32(min(lost + sent * exp32(quiet), F(1)))
+        log_weights[i] += quiet
 
 
 @lean_piece
@@ -290,7 +328,21 @@ def filter_row(key, period, belief, network, reports, b, c, room):
     if resampled:
         u = draws.uniform(draws.stream(key, period, draws.RESAMPLING), 0)
         resample(u, x, log_weights, weights, total, slots, states)
+        if c.spread_scale > 0.0:
+            spread_copies(draws.stream(key, period, draws.SPREAD), slots[2, REACH:], c.spread_scale, row.cov, x)
     return resampled
+
+
+@lean_piece
+def redraw_row(key, period, belief, b):
+    """The new head of row b draws its particles from the mean and covariance handed over, with equal weights."""
+    x, mean, root = belief.particles[b], belief.row[b].mean, lower_root(belief.row[b].cov)
+    stream = draws.stream(key, period, draws.HANDOVER)
+    for i in range(x.shape[1]):
+        d0, d1, d2, d3 = correlated(stream, i, root)
+        x[0, i], x[1, i] = F(mean[0]) + d0, F(mean[1]) + d1
+        x[2, i], x[3, i] = F(mean[2]) + d2, F(mean[3]) + d3
+    belief.log_weights[b, :] = F(0)
 
 
 @piece

@@ -1,9 +1,16 @@
-"""Resampling: which particles live on, one row at a time."""
+"""Resampling: which particles live on, and where their further copies go, one row at a time.
+
+Systematic resampling copies a particle in proportion to its weight. Copies of one particle stay together until the
+process noise parts them; where there is little, the cloud shrinks to a few points and the target is lost. The improved
+resampling of patent CN103152791 sets the further copies about their parent instead, in pairs.
+"""
 
 import numpy as np
 from numba import int32, uint32
 
+from wsn_env import draws
 from wsn_env.compiling import lean_piece
+from wsn_env.draws import normal_pair32
 from wsn_env.numerics import F
 
 BLOCK = 8  # particles whose weights are summed apart
@@ -78,3 +85,79 @@ def draw(x, ancestors, states, drawn):
         vx[k] = after[4 * k + 1]
         py[k] = after[4 * k + 2]
         vy[k] = after[4 * k + 3]
+
+
+@lean_piece
+def spread_copies(stream, ancestors, scale, cov, x):
+    """Set the further copies of every particle about it, in pairs that leave the mean where it is.
+
+        n = 2m + 1 copies    x, x +- j S, j = 1..m
+        n = 2m               x, x, x +- j S, j = 1..m - 1
+
+    with S = scale L u, L L' = cov and u ~ N(0, I) drawn for each parent. So 2n copies bring 2 (n - 1) new particles, as
+    the patent says, and those of a parent have m (m + 1) / 3 or (m - 1)(2m - 1) / 6 times S S' about it.
+
+    Differs from the patent, which has one S for all, the sds of the components: then all copies lie on parallel lines.
+
+    Args:
+        ancestors: (P,) in ascending order.
+        cov: (4, 4) of the cloud before it was resampled.
+        x: (4, P) copies, spread in place.
+    """
+    root = lower_root(cov)
+    n, start, size = x.shape[1], 0, F(scale)
+    while start < n:
+        parent = ancestors[start]
+        stop = start + 1
+        while stop < n and ancestors[stop] == parent:
+            stop += 1
+        pairs = (stop - start - 1) // 2
+        if pairs > 0:
+            d0, d1, d2, d3 = correlated(stream, parent, root)
+            for j in range(1, pairs + 1):
+                far = size * F(j)
+                for place, side in ((stop - 2 * j, far), (stop - 2 * j + 1, -far)):
+                    x[0, place] += side * d0
+                    x[1, place] += side * d1
+                    x[2, place] += side * d2
+                    x[3, place] += side * d3
+        start = stop
+
+
+@lean_piece
+def lower_root(cov):
+    """The ten entries, row by row, of the lower triangular L with L L' = cov (4, 4), in float32 (Cholesky).
+
+    A direction in which the cloud has no extent, but for rounding, gets none.
+    """
+    l00, i0 = _pivot(cov[0, 0], cov[0, 0])
+    l10, l20, l30 = cov[1, 0] * i0, cov[2, 0] * i0, cov[3, 0] * i0
+    l11, i1 = _pivot(cov[1, 1] - l10 * l10, cov[1, 1])
+    l21, l31 = (cov[2, 1] - l20 * l10) * i1, (cov[3, 1] - l30 * l10) * i1
+    l22, i2 = _pivot(cov[2, 2] - l20 * l20 - l21 * l21, cov[2, 2])
+    l32 = (cov[3, 2] - l30 * l20 - l31 * l21) * i2
+    l33, _ = _pivot(cov[3, 3] - l30 * l30 - l31 * l31 - l32 * l32, cov[3, 3])
+    return F(l00), F(l10), F(l11), F(l20), F(l21), F(l22), F(l30), F(l31), F(l32), F(l33)
+
+
+@lean_piece
+def _pivot(rest, variance):
+    """Root of what is left of a variance, and its inverse; 0 and 0 where that is rounding."""
+    if rest <= 1e-6 * variance or rest < 1e-30:
+        return 0.0, 0.0
+    root = np.sqrt(rest)
+    return root, 1.0 / root
+
+
+@lean_piece
+def correlated(stream, index, root):
+    """L u with u ~ N(0, I), number `index` of a stream; four float32."""
+    l00, l10, l11, l20, l21, l22, l30, l31, l32, l33 = root
+    u0, u1 = normal_pair32(draws.bits(stream, 2 * index))
+    u2, u3 = normal_pair32(draws.bits(stream, 2 * index + 1))
+    return (
+        l00 * u0,
+        l10 * u0 + l11 * u1,
+        l20 * u0 + l21 * u1 + l22 * u2,
+        l30 * u0 + l31 * u1 + l32 * u2 + l33 * u3,
+    )
