@@ -43,5 +43,6 @@ class ViewPolicy:
         return (actions[0] if np.ndim(observation["battery"]) == 1 else actions), state
 
     def detection(self, view: View) -> np.ndarray:
-        """(B, S) detection probability of the living nodes at the prediction (eqs. 2-3)."""
-        return np.where(view.alive, detection_probability(view.distance, self.scenario.detection), 0.0)
+        """(B, S) detection probability of the living nodes at the prediction."""
+        p = detection_probability(view.distance, self.scenario.detection, self.scenario.measurement)
+        return np.where(view.alive, p, 0.0)

@@ -30,5 +30,5 @@ class Centroid(ViewPolicy):
         distance = np.where(view.alive, distances_to(view.positions, centre), np.inf)
         stay = (count == 0) & (view.head >= 0)
         head = np.where(stay, view.head, distance.argmin(axis=1))
-        members = np.where(stay[:, None], view.member, distance <= self.scenario.detection.radius_m)
+        members = np.where(stay[:, None], view.member, distance <= self.scenario.radius_m)
         return Cluster.of(head, members)

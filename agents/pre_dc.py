@@ -58,5 +58,5 @@ class PreDC(ViewPolicy):
     def _head_energy_j(self, p: np.ndarray) -> np.ndarray:
         """(B,) energy of a handover (received, and passed on across the sensing range) and of hearing one period."""
         radio, bits = self.scenario.radio, self.scenario.handover_bits
-        handover = radio.receiving_j(bits) + radio.sending_j(bits, 2 * self.scenario.detection.reach_m)
+        handover = radio.receiving_j(bits) + radio.sending_j(bits, 2 * self.scenario.reach_m)
         return handover + radio.receiving_j(radio.report_bits) * (p > 0).sum(axis=1)

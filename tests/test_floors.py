@@ -19,6 +19,7 @@ FLOORS = {
     "wsn_env.numerics": 1,
     "wsn_env.draws": 1,
     "wsn_env.physics": 2,
+    "wsn_env.physics.acoustics": 0,  # formulas that sections need
     "wsn_env.trackers": 3,
     "wsn_env.view": 3,
     "wsn_env.episode": 3,

@@ -25,7 +25,12 @@ PACKAGE = Path(__file__).parent
 SERIAL_ROWS = 8  # up to here one thread is faster than handing work out
 
 FAST = {"reassoc", "contract", "arcp", "nsz"}  # not nnan, ninf: infinities and NaN mean what they mean
-FAST_MODULES = ("wsn_env.trackers.kernels", "wsn_env.numerics", "wsn_env.draws")  # the filter; the world stays strict
+FAST_MODULES = (  # the filter; the world stays strict
+    "wsn_env.trackers.kernels",
+    "wsn_env.trackers.resampling",
+    "wsn_env.numerics",
+    "wsn_env.draws",
+)
 
 # fastmath=False is said aloud: a piece that says nothing takes over what its first caller has.
 piece = numba.njit(error_model="numpy", nogil=True, fastmath=False, _nrt=True)

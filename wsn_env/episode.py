@@ -5,7 +5,7 @@ import numpy as np
 from wsn_env import draws
 from wsn_env.compiling import kernel, piece
 from wsn_env.numerics import exp, log
-from wsn_env.physics.field import index_nodes, scatter
+from wsn_env.physics.field import index_nodes, lay_out, scatter
 from wsn_env.physics.motion import draw_track
 from wsn_env.physics.radio import close_books
 from wsn_env.scenario import Scenario
@@ -20,12 +20,14 @@ START = np.dtype(
         ("high", "f8"),
         ("seeded", "i8"),
         ("field_key", "u8"),
+        ("grid", "i8"),
+        ("jitter", "f8"),
     ]
 )
 
 
 def start_record(scenario: Scenario) -> np.ndarray:
-    """What `begin` needs beside the constants, an array of one: P0, battery, lam, the seed of a fixed field."""
+    """What `begin` needs beside the constants, an array of one: P0, battery, lam, layout, the seed of a fixed field."""
     known = scenario.tracking.start == "known"
     record = np.zeros(1, START)
     record["known"] = known
@@ -33,6 +35,7 @@ def start_record(scenario: Scenario) -> np.ndarray:
     record["sd_ms"] = scenario.tracking.start_sd_ms if known else scenario.tracking.search_sd_ms
     record["battery"] = scenario.radio.battery_j
     record["low"], record["high"] = scenario.lam_range
+    record["grid"], record["jitter"] = scenario.field.layout == "grid", scenario.field.jitter
     if scenario.field.field_seed is not None:
         record["seeded"] = 1
         record["field_key"] = draws.key_of_seed(scenario.field.field_seed)
@@ -64,7 +67,11 @@ def begin(start, stop, cs, rows, keys, motion, numbers, recordings, starts, plac
         if len(placed) > 0:
             network.positions[b] = placed
         else:
-            scatter(draws.stream(s.field_key if s.seeded else key, 0, draws.FIELD), c.side_m, network.positions[b])
+            field_stream = draws.stream(s.field_key if s.seeded else key, 0, draws.FIELD)
+            if s.grid:
+                lay_out(field_stream, c.side_m, s.jitter, network.positions[b])
+            else:
+                scatter(field_stream, c.side_m, network.positions[b])
         index_nodes(network.positions[b], network.grid, b)
         network.battery[b] = s.battery
         network.row[b].alive = network.battery.shape[1]

@@ -144,7 +144,7 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict]:
         sums["members"] += outcome.members
         sums["handovers"] += outcome.handover
         sums["searches"] += outcome.searched
-        sums["lost"] += outcome.error_m > 2 * scenario.detection.radius_m
+        sums["lost"] += outcome.error_m > 2 * scenario.radius_m
     n = scenario.periods
     columns = {
         "lam": state.lam,

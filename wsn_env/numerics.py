@@ -18,6 +18,37 @@ I32 = np.int32
 LN2 = 0.6931471805599453
 LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 HALF_PI = 1.5707963267948966
+ROOT_HALF = 0.7071067811865476
+
+# ln(erfc(z) e**(z^2) / t) as a polynomial in 2 t - 1, t = 2 / (2 + z), highest power first: the Chebyshev interpolant
+# of degree 24 (absolute error 4e-15), in the form of Numerical Recipes' erfc.
+ERFC = (
+    -1.37913070917111069e-8,
+    2.99232730577075805e-8,
+    8.35469423874085521e-8,
+    -2.90244399559999255e-7,
+    -5.74572411191407616e-8,
+    1.2851059663435587e-6,
+    -1.38533809612471535e-6,
+    -2.96593298591063188e-6,
+    8.63948536674403859e-6,
+    1.42095099946580649e-7,
+    -0.0000302232856041113943,
+    0.000031745644525872318,
+    0.0000714119742099591563,
+    -0.000174303633404306268,
+    -0.0000937372484413609842,
+    0.000673679012559595357,
+    -0.000146246585938197734,
+    -0.00234581253445585102,
+    0.00175893353833438351,
+    0.00882493855975445077,
+    -0.00987268936575432916,
+    -0.0468956102312684307,
+    0.047343306841898187,
+    0.672643223977657637,
+    -0.671794084056692265,
+)
 
 
 def _bitcast(source, target, llvm_type):
@@ -87,15 +118,6 @@ def exp(x):
     y = 1.0 - ((low - (r * c) / (2.0 - c)) - high)
     half = int(n) >> 1  # two factors, since 2**n alone may leave the range of doubles
     return y * f64_from_bits((half + 1023) << 52) * f64_from_bits((int(n) - half + 1023) << 52)
-
-
-@piece
-def normal_cdf(x):
-    """Phi(x) within 1e-7 (Abramowitz & Stegun, 1964, 26.2.17)."""
-    k = 1.0 / (1.0 + 0.2316419 * abs(x))
-    tail = k * (0.319381530 + k * (-0.356563782 + k * (1.781477937 + k * (-1.821255978 + k * 1.330274429))))
-    tail *= 0.3989422804014327 * exp(-0.5 * x * x)
-    return tail if x < 0.0 else 1.0 - tail
 
 
 @piece
@@ -192,3 +214,41 @@ def tanh32(x):
     e = exp32(F(-2) * abs(x))
     y = (F(1) - e) / (F(1) + e)
     return y if x >= 0 else -y
+
+
+@piece
+def normal_cdf(x):
+    """Phi(x), the standard normal distribution function (relative error below 1e-12, 0 below -37.6)."""
+    z = ROOT_HALF * abs(x)
+    t = 2.0 / (2.0 + z)
+    p = 0.0
+    for coefficient in ERFC:
+        p = p * (2.0 * t - 1.0) + coefficient
+    tail = 0.5 * t * exp(p - z * z)
+    return tail if x < 0.0 else 1.0 - tail
+
+
+@piece
+def log_normal_cdf32(x):
+    """ln Phi(x) for float32, finite and at most 0 (absolute error below 1e-7 + 4e-7 |ln Phi|).
+
+    Without a branch; ERFC's polynomial to degree 11.
+    """
+    z = F(ROOT_HALF) * min(abs(x), F(1e15))
+    t = F(2) / (F(2) + z)
+    u = F(2) * t - F(1)
+    p = F(-9.2464577956e-5)
+    p = p * u + F(8.5083166098e-6)
+    p = p * u + F(0.00058807168876)
+    p = p * u - F(0.00022919226001)
+    p = p * u - F(0.0023031434654)
+    p = p * u + F(0.0017952014937)
+    p = p * u + F(0.0088151569561)
+    p = p * u - F(0.0098804316376)
+    p = p * u - F(0.046894781015)
+    p = p * u + F(0.047343940395)
+    p = p * u + F(0.67264321249)
+    p = p * u - F(0.67179409278)
+    tail = min(log32(F(0.5) * t) + (p - z * z), F(0))  # ln Phi(-|x|)
+    below = F(x < F(0))
+    return below * tail + (F(1) - below) * log32(-expm1_32(tail))

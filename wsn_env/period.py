@@ -6,7 +6,7 @@ from wsn_env import draws
 from wsn_env.compiling import kernel, lean_kernel, lean_piece
 from wsn_env.physics import radio, sensing
 from wsn_env.physics.field import nearest_living, squared_distance
-from wsn_env.trackers.kernels import filter_row, scratch
+from wsn_env.trackers.kernels import filter_row, redraw_row, scratch
 from wsn_env.types import KEEP_CLUSTER, KEEP_HEAD, Outcome, state_of
 
 
@@ -20,6 +20,8 @@ def run(start, stop, cs, heads, chosen, lost, outcomes, *arrays):
     for b in range(start, stop):
         _sense_and_report(heads[b], chosen[b], state, outcome, b, cs[0])
         key, period = state.key[b], state.row[b].period
+        if cs[0].redraw and outcome.row[b].handover:
+            redraw_row(key, period, state.belief, b)
         resampled = filter_row(key, period, state.belief, state.network, state.reports, b, cs[0], room)
         lost[b] = _conclude(resampled, state, outcome, b, cs[0])
         count += lost[b]
@@ -72,6 +74,8 @@ def _sense_and_report(head, chosen, state, outcome, b, c):
             node = head if k == place else members[k - (k > place)]
             if _wake(node, radio.SENSING, state, outcome, b, c):
                 _sense(node, head, radio.REPORT, target, state, outcome, b, c)
+    if c.asleep_j > 0.0:
+        _sleep(state, outcome, b, c)
     _remember_miss(state, b, c)
 
 
@@ -100,8 +104,11 @@ def _take_choice(head, chosen, state, outcome, b, c):
     kept = 0
     for k in range(count):
         if wished[k] != head:
-            wished[kept] = wished[k]
-            kept += 1
+            if radio.in_one_hop(wished[k], head, network.positions[b], c):
+                wished[kept] = wished[k]
+                kept += 1
+            else:
+                out.dropped += 1
     out.handover = radio.form(head, wished, kept, state, outcome, b, c)
     out.members = 1 + standing.n_members
 
@@ -130,8 +137,21 @@ def _list_living(chosen, battery, found):
 
 @lean_piece
 def _wake(node, purpose, state, outcome, b, c):
-    """A node pays for sensing in this period. Returns whether it could."""
-    return state.network.battery[b, node] > 0.0 and radio.spend(node, c.sensing_j, purpose, state, outcome, b)
+    """A node pays for being awake in this period. Returns whether it could."""
+    return state.network.battery[b, node] > 0.0 and radio.spend(node, c.awake_j, purpose, state, outcome, b)
+
+
+@lean_piece
+def _sleep(state, outcome, b, c):
+    """All living nodes outside the cluster pay for the period, too."""
+    network, standing = state.network, state.network.row[b]
+    battery, members, j = network.battery[b], network.members[b], 0
+    for node in range(len(battery)):
+        while j < standing.n_members and members[j] < node:
+            j += 1
+        awake = node == standing.head or (j < standing.n_members and members[j] == node)
+        if not awake and battery[node] > 0.0:
+            radio.spend(node, c.asleep_j, radio.SENSING, state, outcome, b)
 
 
 @lean_piece
@@ -139,10 +159,10 @@ def _sense(node, head, purpose, target, state, outcome, b, c):
     """An awake node's period: detect, measure, report."""
     positions, battery, reports = state.network.positions[b], state.network.battery[b], state.reports
     key, period = state.key[b], state.row[b].period
-    distance = np.sqrt(squared_distance(positions, node, target[0], target[1]))
     if battery[node] <= 0.0:
         return
-    value = sensing.tells(key, period, node, distance, c)
+    squared = squared_distance(positions, node, target[0], target[1])
+    value = sensing.tells(key, period, node, squared, c)
     has_news = _update_state(node, value, purpose, state, b, c) if c.model == sensing.BINARY else value
     if not has_news:
         return
@@ -281,7 +301,7 @@ def _wake_all(state, outcome, b, c):
             continue
         outcome.row[b].members += 1
         squared = squared_distance(positions, node, target[0], target[1])
-        if battery[node] > 0.0 and sensing.tells(key, period, node, np.sqrt(squared), c):
+        if battery[node] > 0.0 and sensing.tells(key, period, node, squared, c):
             has_strength = c.model != sensing.POSITION and c.model != sensing.BINARY
             signal = sensing.measured_strength(key, period, node, squared, c) if has_strength else -squared
             if signal > best:

@@ -3,23 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from wsn_env.quantity import NUMBERS, ScenarioError, Section, quantity, suggest
 from wsn_env.sections import (
+    DETECTIONS,
     MEASUREMENTS,
     MOTIONS,
+    RADIOS,
     Binary,
     Crossing,
+    Cruise,
     Detection,
     Field,
+    Link,
     Measurement,
+    Modem,
     Motion,
     Position,
     Radio,
     Rssi,
+    Sonar,
+    Threshold,
     Tracking,
 )
 
@@ -29,11 +37,12 @@ KINDS = {
     "name": (str,),
     "field": (Field,),
     "motion": tuple(MOTIONS.values()),
-    "detection": (Detection,),
+    "detection": tuple(DETECTIONS.values()),
     "measurement": tuple(MEASUREMENTS.values()),
-    "radio": (Radio,),
+    "radio": tuple(RADIOS.values()),
     "tracking": (Tracking,),
 }
+BY_NAME = {"motion": MOTIONS, "detection": DETECTIONS, "measurement": MEASUREMENTS, "radio": RADIOS}
 
 
 @dataclass(frozen=True)
@@ -48,9 +57,9 @@ class Scenario(Section):
     typical_energy_mj: float = quantity(0.3, "its energy in a period", at_least=0)
     field: Field = Field()
     motion: Motion = Crossing()
-    detection: Detection = Detection()
+    detection: Detection | Threshold = Detection()
     measurement: Measurement = Position()
-    radio: Radio = Radio()
+    radio: Link = Radio()
     tracking: Tracking = Tracking()
 
     def __post_init__(self):
@@ -62,6 +71,13 @@ class Scenario(Section):
         low, high = self.lam_range
         if not (np.isfinite([low, high]).all() and 0 <= low <= high) or (low == 0) != (high == 0):
             raise ScenarioError(f"Scenario.lam = {self.lam!r}: must be at least 0 m/mJ, or a pair 0 < low <= high")
+        if isinstance(self.detection, Threshold):
+            self.detection.check(self.measurement)
+        if isinstance(self.radio, Modem) and self.period_s < self.radio.report_s:
+            raise ScenarioError(
+                f"Scenario.period_s = {self.period_s}: must be at least {self.radio.report_s:.3g} s, until a report of"
+                f" {self.radio.report_bits} bits has arrived"
+            )
 
     @property
     def lam_range(self) -> tuple[float, float]:
@@ -79,12 +95,22 @@ class Scenario(Section):
     @property
     def ring_m(self) -> float:
         """How far from the target a node tells most: at the edge of detection for one bit, as near as may be else."""
-        return self.detection.radius_m if self.binary else 0.0
+        return self.radius_m if self.binary else 0.0
 
     @property
     def filter_q(self) -> float:
         """The filter's acceleration noise [m/s^2]."""
         return self.motion.fitting_q if self.tracking.filter_q is None else self.tracking.filter_q
+
+    @cached_property
+    def radius_m(self) -> float:
+        """Sensing radius; with a threshold, where the mean level is at it."""
+        return self.detection.distances_m(self.measurement)[0]
+
+    @cached_property
+    def reach_m(self) -> float:
+        """From here on a node detects nothing (with a threshold, less than once in a million periods)."""
+        return self.detection.distances_m(self.measurement)[1]
 
     @property
     def handover_bits(self) -> int:
@@ -101,7 +127,7 @@ class Scenario(Section):
         """A preset, with overrides by quantity.
 
         Args:
-            name: "PreDC-v0" or "Rssi-v0", with or without "wsn_env/".
+            name: one of PRESETS, with or without "wsn_env/".
             overrides: as for `override`.
         """
         short = name.removeprefix("wsn_env/")
@@ -112,13 +138,13 @@ class Scenario(Section):
     def override(self, **changes) -> Scenario:
         """A copy with some quantities changed, whatever section they stand in.
 
-        Sections are given whole or, for motion and measurement, by name: `override(nodes=400, motion="sine",
+        Sections are given whole or, where there are several kinds, by name: `override(nodes=400, motion="sine",
         amplitude_m=20, tracker="ekf")`. An unknown keyword raises and suggests.
         """
         if changes.get("positions") is not None:
             changes.setdefault("nodes", Field.nodes)  # the positions tell how many
         whole = {}
-        for name, kinds in (("motion", MOTIONS), ("measurement", MEASUREMENTS)):
+        for name, kinds in BY_NAME.items():
             if isinstance(changes.get(name), str):
                 chosen = changes.pop(name)
                 if chosen not in kinds:
@@ -128,14 +154,13 @@ class Scenario(Section):
         for item in fields(self):
             if item.name in changes:
                 whole[item.name] = changes.pop(item.name)
-        scenario = replace(self, **whole)
-        for item in fields(scenario):
-            section = getattr(scenario, item.name)
+        for item in fields(self):
+            section = whole.get(item.name, getattr(self, item.name))
             if is_dataclass(section):
                 own = {part.name for part in fields(section)} & changes.keys()
                 if own:
-                    new = replace(section, **{key: changes.pop(key) for key in own})
-                    scenario = replace(scenario, **{item.name: new})
+                    whole[item.name] = replace(section, **{key: changes.pop(key) for key in own})
+        scenario = replace(self, **whole)  # once, since sections may only fit together after all changes
         if changes:
             name = next(iter(changes))
             raise ScenarioError(f"scenario has no quantity {name!r}: {suggest(name, scenario.quantities())}")
@@ -192,5 +217,24 @@ PRESETS = {
         measurement=Rssi(exponent=3.0),
         radio=Radio(receiver="target", report_bits=128, invitation_bits=0, retries=0),
         tracking=Tracking(filter_q=1.0, start_sd_m=10.0, start_sd_ms=1.0, search=False),
+    ),
+    "Underwater-v0": Scenario(
+        name="Underwater-v0",
+        period_s=5.0,
+        lam=0.006,
+        typical_error_m=16.0,
+        typical_energy_mj=1400.0,
+        field=Field(nodes=64, side_m=1000.0, layout="grid"),
+        motion=Cruise(),
+        detection=Threshold(),
+        measurement=Sonar(),
+        radio=Modem(),
+        tracking=Tracking(
+            particles=1000,
+            silent_information=True,
+            resampling="spread",
+            start_sd_m=20.0,
+            start_sd_ms=1.0,
+        ),
     ),
 }

@@ -6,21 +6,32 @@ follow from others are properties, never fields.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from math import isqrt
 from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
+from wsn_env.physics.acoustics import absorption_db_per_km
 from wsn_env.quantity import ScenarioError, Section, quantity
 
 
 @dataclass(frozen=True)
 class Field(Section):
-    """Where the nodes stand: uniformly at random in a square, anew in every episode unless fixed."""
+    """Where the nodes stand: drawn in a square, anew in every episode unless fixed."""
 
     nodes: int = quantity(225, "number of sensor nodes S", at_least=1, whole=True)
     side_m: float = quantity(100.0, "side of the square field", above=0, at_most=100_000)
+    layout: str = quantity(
+        "uniform",
+        "uniform: anywhere; grid: each within a square cell of its own (a square number of nodes)",
+        choices=("uniform", "grid"),
+    )
+    jitter: float = quantity(
+        0.25, "grid: uniform offset from the cell's middle, in cells either way", at_least=0, at_most=0.5
+    )
     field_seed: int | None = quantity(
         None,
         "one fixed field drawn from this seed; None: a new one each episode",
@@ -49,6 +60,8 @@ class Field(Section):
                 raise ScenarioError(f"Field.nodes = {self.nodes}: must be {len(array)}, as many as there are positions")
             object.__setattr__(self, "positions", tuple(map(tuple, array.tolist())))
             object.__setattr__(self, "nodes", len(array))
+        elif self.layout == "grid" and isqrt(self.nodes) ** 2 != self.nodes:
+            raise ScenarioError(f"Field.nodes = {self.nodes}: must be a square number (1, 4, 9, ...) on a grid")
 
 
 # --- how the target moves -----------------------------------------------------------------------------------
@@ -121,6 +134,22 @@ class Waypoint(Motion):
 
 
 @dataclass(frozen=True)
+class Cruise(Motion):
+    """From a uniform point of the inner field at a given speed in any direction, with white acceleration.
+
+    Start, heading and noise are drawn until the whole track keeps its distance from the border. White acceleration of
+    density D [m^2/s^3] is, in periods of T seconds, one of sd sqrt(D / T): the positions lack an independent part of
+    variance D T^3 / 12 then, which is negligible beside any measurement here.
+    """
+
+    fitting_q: ClassVar[float] = 0.015
+    speed_ms: float = quantity(1.0, "speed at the start", above=0)
+    acceleration_ms2: float = quantity(0.01, "sd of the white acceleration on the track", at_least=0)
+    inset_m: float = quantity(200.0, "starts keep this distance from the border", at_least=0)
+    margin_m: float = quantity(60.0, "the whole track keeps this distance from the border", at_least=0)
+
+
+@dataclass(frozen=True)
 class Recorded(Motion):
     """Recorded tracks from CSV files with columns t, x, y [s, m, m]; an episode picks one by its key.
 
@@ -181,6 +210,7 @@ MOTIONS = {
     "circle": Circle,
     "turns": Turns,
     "waypoint": Waypoint,
+    "cruise": Cruise,
     "recorded": Recorded,
     "legs": Legs,
 }
@@ -193,6 +223,7 @@ MOTIONS = {
 class Detection(Section):
     """Probability of detection against distance (eqs. 2-3)."""
 
+    code: ClassVar[int] = 0
     radius_m: float = quantity(10.0, "sensing radius r_s", above=0)
     softness: float = quantity(0.2, "delta: half width of the soft edge, in radii", above=0, at_most=1)
     decay: float = quantity(1.0, "lambda1", at_least=0)
@@ -204,6 +235,47 @@ class Detection(Section):
     def reach_m(self) -> float:
         """From here on a node detects nothing."""
         return (1 + self.softness) * self.radius_m
+
+    def distances_m(self, measurement: Measurement) -> tuple[float, float]:
+        """Sensing radius and reach, whatever is measured."""
+        return self.radius_m, self.reach_m
+
+
+@dataclass(frozen=True)
+class Threshold(Section):
+    """A node detects when the strength that it measures exceeds a threshold; it reports that very measurement.
+
+        p(d) = Phi((h(d) - threshold) / sigma)
+
+    with the mean level h and its noise sd sigma. Needs a level in dB.
+    """
+
+    code: ClassVar[int] = 1
+    threshold_db: float = quantity(85.0, "weakest level that counts")
+
+    def check(self, measurement: Measurement) -> None:
+        """Raise ScenarioError unless the mean level falls to the threshold somewhere."""
+        if not isinstance(measurement, Level):
+            raise ScenarioError(
+                f"Scenario.detection = {self}: needs a measured level in dB, so that the measurement must be a Rssi or"
+                f" Sonar; it is a {type(measurement).__name__}"
+            )
+        low, high = (measurement.mean_db(d) for d in (FARTHEST_M, 0.0))
+        if not low < self.threshold_db < high:
+            raise ScenarioError(
+                f"Threshold.threshold_db = {self.threshold_db}: must be between the mean levels at {FARTHEST_M:g} m and"
+                f" at the source, {low:.4g} and {high:.4g} dB"
+            )
+
+    def distances_m(self, measurement: Measurement) -> tuple[float, float]:
+        """Sensing radius, where the mean level is at the threshold, and reach, where p falls to 1e-6 (taken as 0)."""
+        self.check(measurement)
+        weakest = self.threshold_db - LEAST_SDS * measurement.noise_db
+        return measurement.distance_m(self.threshold_db), measurement.distance_m(weakest)
+
+
+LEAST_SDS = 4.753424308822899  # Phi(-this) = 1e-6
+DETECTIONS = {"radius": Detection, "threshold": Threshold}
 
 
 @dataclass(frozen=True)
@@ -221,8 +293,43 @@ class Position(Measurement):
     noise_m: float = quantity(2.0, "sd of each coordinate", above=0)
 
 
+FARTHEST_M = 1e7
+
+
+class Level(Measurement):
+    """Base of strengths in dB, with Gaussian noise of sd `noise_db` about
+
+    h(d) = level at 1 m - 10 n log10(d) - absorption d,    d at least `floor_m`
+    """
+
+    exponent: float
+    noise_db: float
+    floor_m: float
+    absorption_db_per_m: ClassVar[float] = 0.0
+
+    @property
+    def at_1m_db(self) -> float:
+        """The first term."""
+        raise NotImplementedError
+
+    def mean_db(self, distance_m: float) -> float:
+        """h(d)."""
+        d = max(distance_m, self.floor_m)
+        return self.at_1m_db - 10 * self.exponent * math.log10(d) - self.absorption_db_per_m * d
+
+    def distance_m(self, level_db: float) -> float:
+        """Where the mean level falls to this one, by bisection; 0: nowhere so high; FARTHEST_M: not before there."""
+        if self.mean_db(self.floor_m) <= level_db:
+            return 0.0
+        near, far = self.floor_m, max(FARTHEST_M, self.floor_m)
+        for _ in range(200):
+            middle = math.sqrt(near * far)
+            near, far = (middle, far) if self.mean_db(middle) > level_db else (near, middle)
+        return far
+
+
 @dataclass(frozen=True)
-class Rssi(Measurement):
+class Rssi(Level):
     """Received strength in dB: reference - 10 n log10(max(d, floor)) + noise (eq. 1 in its log-distance form)."""
 
     code: ClassVar[int] = 1
@@ -230,6 +337,42 @@ class Rssi(Measurement):
     exponent: float = quantity(2.5, "path loss exponent n", above=0)
     noise_db: float = quantity(3.0, "sd", above=0)
     floor_m: float = quantity(1.0, "nearer than this the level grows no more", above=0)
+
+    @property
+    def at_1m_db(self) -> float:
+        """The reference."""
+        return self.reference_dbm
+
+
+@dataclass(frozen=True)
+class Sonar(Level):
+    """Received level of a sound in the sea: source - 10 k log10(d) - alpha(f) d + noise, d at least `floor_m`.
+
+    Urick's passive sonar equation with Thorp's absorption; k = 1 is cylindrical spreading, 2 spherical, 1.5 the
+    customary middle. The source's 120 dB are an assumption of ours.
+    """
+
+    code: ClassVar[int] = 3
+    source_db: float = quantity(120.0, "source level at 1 m, dB re 1 uPa")
+    spreading: float = quantity(1.5, "k", above=0)
+    frequency_khz: float = quantity(10.0, "f", at_least=0.4, at_most=1000)
+    noise_db: float = quantity(3.0, "sd of a measured level", above=0)
+    floor_m: float = quantity(1.0, "nearer than this the level grows no more", above=0)
+
+    @property
+    def at_1m_db(self) -> float:
+        """The source level."""
+        return self.source_db
+
+    @property
+    def exponent(self) -> float:
+        """k, by the name that it has on land."""
+        return self.spreading
+
+    @property
+    def absorption_db_per_m(self) -> float:
+        """alpha(f)."""
+        return absorption_db_per_km(self.frequency_khz) / 1000
 
 
 @dataclass(frozen=True)
@@ -264,19 +407,16 @@ class Binary(Measurement):
     edge_m: float = quantity(1.0, "width of the edge of detection that the particle filter believes in", above=0)
 
 
-MEASUREMENTS = {"position": Position, "rssi": Rssi, "rssi_power": RssiPower, "binary": Binary}
+MEASUREMENTS = {"position": Position, "rssi": Rssi, "rssi_power": RssiPower, "sonar": Sonar, "binary": Binary}
 
 
 # --- what talking costs ------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
-class Radio(Section):
-    """Energy per bit (eq. 5), packet sizes, loss, batteries."""
+class Link(Section):
+    """Base of radio and modem: packet sizes, loss, batteries. What a bit and a period cost is up to the kinds."""
 
-    tx_nj_per_bit: float = quantity(50.0, "e1: sending, whatever the distance", at_least=0)
-    amplifier_pj_per_bit_m2: float = quantity(150.0, "e2: sending, times distance squared", at_least=0)
-    rx_nj_per_bit: float = quantity(100.0, "e_r: receiving", at_least=0)
     report_bits: int = quantity(512, "a member's report", at_least=0, whole=True)
     invitation_bits: int = quantity(128, "an invitation to a new member", at_least=0, whole=True)
     handover_bits: int = quantity(448, "the estimate, from old to new head", at_least=0, whole=True)
@@ -295,21 +435,115 @@ class Radio(Section):
         " node, which hears their beacons",
         choices=("head", "sink", "target"),
     )
-    sensing_nj: float = quantity(0.0, "energy of an awake node's sensing, per period", at_least=0)
     battery_j: float = quantity(1.0, "a node's energy at the start", above=0)
 
-    def sending_j(self, bits: float, distance_m: float) -> float:
-        """Energy of sending (eq. 5): bits (e1 + e2 d^2)."""
-        return bits * (1e-9 * self.tx_nj_per_bit + 1e-12 * self.amplifier_pj_per_bit_m2 * distance_m**2)
-
-    def receiving_j(self, bits: float) -> float:
-        """Energy of receiving (eq. 5): bits e_r."""
-        return bits * 1e-9 * self.rx_nj_per_bit
+    hop_m: ClassVar[float] = math.inf  # no packet goes farther at once
+    tx_j_per_bit: ClassVar[float]  # sending, whatever the distance
+    amplifier_j_per_bit_m2: ClassVar[float] = 0.0  # sending, times distance squared
+    rx_j_per_bit: ClassVar[float]  # receiving
 
     @property
     def delivery(self) -> float:
         """Probability that a report arrives within all its tries."""
         return 1 - (1 - self.packet_success) ** (1 + self.retries)
+
+    def sending_j(self, bits: float, distance_m: float) -> float:
+        """Energy of sending over a distance, relayed where it is beyond one hop: bits (e1 + e2 d^2) for each."""
+        hops = max(1, math.ceil(distance_m / self.hop_m))
+        return hops * bits * (self.tx_j_per_bit + self.amplifier_j_per_bit_m2 * distance_m**2)
+
+    def receiving_j(self, bits: float) -> float:
+        """Energy of receiving: bits e_r."""
+        return bits * self.rx_j_per_bit
+
+    def awake_j(self, period_s: float) -> float:
+        """What an awake node pays for a period, packets apart."""
+        raise NotImplementedError
+
+    def asleep_j(self, period_s: float) -> float:
+        """What a sleeping node pays for a period."""
+        return 0.0
+
+
+@dataclass(frozen=True)
+class Radio(Link):
+    """Energy per bit (eq. 5); sleeping costs nothing, and every node hears every other."""
+
+    tx_nj_per_bit: float = quantity(50.0, "e1: sending, whatever the distance", at_least=0)
+    amplifier_pj_per_bit_m2: float = quantity(150.0, "e2: sending, times distance squared", at_least=0)
+    rx_nj_per_bit: float = quantity(100.0, "e_r: receiving", at_least=0)
+    sensing_nj: float = quantity(0.0, "energy of an awake node's sensing, per period", at_least=0)
+
+    @property
+    def tx_j_per_bit(self) -> float:
+        """e1 in J."""
+        return 1e-9 * self.tx_nj_per_bit
+
+    @property
+    def amplifier_j_per_bit_m2(self) -> float:
+        """e2 in J."""
+        return 1e-12 * self.amplifier_pj_per_bit_m2
+
+    @property
+    def rx_j_per_bit(self) -> float:
+        """e_r in J."""
+        return 1e-9 * self.rx_nj_per_bit
+
+    def awake_j(self, period_s: float) -> float:
+        """Sensing."""
+        return 1e-9 * self.sensing_nj
+
+
+@dataclass(frozen=True)
+class Modem(Link):
+    """An acoustic modem: fixed powers, one hop, a slow channel, and a little energy even asleep.
+
+    The powers and the rate are those of Newcastle University's Nanomodem V3. A packet of b bits takes b / rate seconds,
+    so that the power of sending and of receiving is an energy per bit, whatever the distance. A node beyond one hop of
+    the head cannot be its member nor report to it; a handover farther than that is relayed, at the old head's
+    expense. An awake node listens for the whole period; a node that a search wakes has paid for its sleep already.
+
+    50 kJ (four lithium D cells have some more) are 46 days of listening or eight years of sleep.
+    """
+
+    transmit_w: float = quantity(1.5, "power while sending", at_least=0)
+    receive_w: float = quantity(0.025, "power while receiving, above listening", at_least=0)
+    listen_w: float = quantity(0.0125, "power of an awake node", at_least=0)
+    sleep_w: float = quantity(0.0002, "power of a sleeping node", at_least=0)
+    bit_rate: float = quantity(640.0, "bits a second", above=0)
+    hop_m: float = quantity(250.0, "range of a transmission", above=0)
+    sound_ms: float = quantity(1500.0, "speed of sound", above=0)
+    report_bits: int = quantity(64, "a member's report", at_least=0, whole=True)
+    invitation_bits: int = quantity(32, "an invitation to a new member", at_least=0, whole=True)
+    handover_bits: int = quantity(256, "the estimate, from old to new head", at_least=0, whole=True)
+    wakeup_bits: int = quantity(32, "the wake-up of a search, paid by its receivers", at_least=0, whole=True)
+    battery_j: float = quantity(50_000.0, "a node's energy at the start", above=0)
+
+    @property
+    def tx_j_per_bit(self) -> float:
+        """Sending."""
+        return self.transmit_w / self.bit_rate
+
+    @property
+    def rx_j_per_bit(self) -> float:
+        """Receiving."""
+        return self.receive_w / self.bit_rate
+
+    @property
+    def report_s(self) -> float:
+        """Until a report across one hop has arrived: its length, and the way of the sound."""
+        return self.report_bits / self.bit_rate + self.hop_m / self.sound_ms
+
+    def awake_j(self, period_s: float) -> float:
+        """Listening."""
+        return self.listen_w * period_s
+
+    def asleep_j(self, period_s: float) -> float:
+        """Sleeping."""
+        return self.sleep_w * period_s
+
+
+RADIOS = {"radio": Radio, "modem": Modem}
 
 
 # --- how the target is tracked -----------------------------------------------------------------------------
@@ -327,7 +561,22 @@ class Tracking(Section):
         "weigh with who reported and who kept silent, too (particle only)",
         choices=(True, False),
     )
-    resample_below: float = quantity(2 / 3, "resample at N_eff below this share of P (eq. 14)", at_least=0, at_most=1)
+    resample_below: float = quantity(
+        2 / 3, "resample at N_eff below this share of P (eq. 14); 1: always", at_least=0, at_most=1
+    )
+    resampling: str = quantity(
+        "systematic",
+        "systematic: copies of the chosen; spread: further copies lie about them in pairs",
+        choices=("systematic", "spread"),
+    )
+    spread_scale: float = quantity(
+        0.5, "spread: distance of the first pair, in sds of the cloud", at_least=0, at_most=10
+    )
+    redraw_on_handover: bool = quantity(
+        False,
+        "the new head draws its particles from the mean and covariance handed over (particle only)",
+        choices=(True, False),
+    )
     filter_q: float | None = quantity(
         None,
         "sd of the filter's acceleration noise [m/s^2]; None: what suits the motion",
@@ -350,3 +599,9 @@ class Tracking(Section):
                 f"Tracking.silent_information = True: allowed is False with the tracker {self.tracker!r}; only the"
                 " particle filter knows what silence means"
             )
+        for name, usual in (("resampling", "systematic"), ("redraw_on_handover", False)):
+            if self.tracker != "particle" and getattr(self, name) != usual:
+                raise ScenarioError(
+                    f"Tracking.{name} = {getattr(self, name)!r}: allowed is {usual!r} with the tracker"
+                    f" {self.tracker!r}, which has no particles"
+                )

@@ -48,8 +48,10 @@ def gain(detection, positions, node, mean, cov, p00, p01, p11, c):
     # The slope of the strength, smoothed over the belief's own width.
     squared = max(dx * dx + dy * dy + 0.5 * (cov[0, 0] + cov[2, 2]), c.floor_m * c.floor_m)
     slope = -2.0 * c.slope / squared
-    if c.model != 1:
+    if c.model == 2:
         slope *= strength(squared, c)
+    elif c.model == 3:
+        slope -= c.absorption / np.sqrt(squared)
     h0, h1 = slope * dx, slope * dy
     b0, b1 = p00 * h0 + p01 * h1, p01 * h0 + p11 * h1
     s = h0 * b0 + h1 * b1 + r

@@ -68,7 +68,7 @@ def frame(state: State, scenario: Scenario, row: int = 0) -> np.ndarray:
         for node in (head, *network.members[row, : network.n_members[row]]):
             disc(*network.positions[row, node], 5, fill=MEMBER)
         if scenario.radio.receiver == "head":
-            disc(*receiver, scenario.detection.radius_m * scale, outline=HEAD)
+            disc(*receiver, scenario.radius_m * scale, outline=HEAD)
         if scenario.radio.receiver != "target":
             disc(*receiver, 7, fill=HEAD)
     if scenario.binary:

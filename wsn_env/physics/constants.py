@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from wsn_env.scenario import Scenario
-from wsn_env.sections import Binary, Position, Rssi
+from wsn_env.sections import Binary, Detection, Level, Measurement, Position, Threshold
 
 RECEIVERS = ("head", "sink", "target")
 
@@ -13,18 +13,21 @@ CONSTANTS = np.dtype(
     [
         ("period_s", "f8"),
         ("side_m", "f8"),
-        # detection, eqs. 2-3
+        # detection: 0 eqs. 2-3, 1 a threshold on the measured level
+        ("detection", "i8"),
         ("radius_m", "f8"),
-        ("inner_m", "f8"),
         ("reach_m", "f8"),
+        ("inner_m", "f8"),
         ("decay", "f8"),
         ("ceiling", "f8"),
         ("decay_power", "f8"),
         ("edge_power", "f8"),
-        # measurement: 0 position, 1 strength in dB, 2 power, 4 one bit
+        ("threshold_db", "f8"),
+        # measurement: 0 position, 1 strength in dB, 2 power, 3 the same as 1 with absorption, 4 one bit
         ("model", "i8"),
         ("level", "f8"),
         ("slope", "f8"),
+        ("absorption", "f8"),  # dB/m
         ("noise", "f8"),
         ("floor_m", "f8"),
         # binary sensors
@@ -33,7 +36,7 @@ CONSTANTS = np.dtype(
         ("every_presence", "i8"),
         ("refresh", "i8"),
         ("ring_m", "f8"),
-        # radio, eq. 5
+        # radio, eq. 5, or modem
         ("tx_j_per_bit", "f8"),
         ("amplifier_j_per_bit_m2", "f8"),
         ("rx_j_per_bit", "f8"),
@@ -46,12 +49,16 @@ CONSTANTS = np.dtype(
         ("tries", "i8"),
         ("delivery", "f8"),
         ("receiver", "i8"),  # its place in RECEIVERS
-        ("sensing_j", "f8"),
+        ("awake_j", "f8"),  # a node's period, packets apart
+        ("asleep_j", "f8"),
+        ("hop_m", "f8"),
         # tracking
         ("q", "f8"),
         ("pooled", "i8"),
         ("silent_information", "i8"),
         ("resample_below", "f8"),
+        ("spread_scale", "f8"),  # 0: systematic resampling alone
+        ("redraw", "i8"),
         ("search", "i8"),
         ("log_search_miss", "f8"),
         ("search_gap", "i8"),
@@ -60,44 +67,16 @@ CONSTANTS = np.dtype(
 
 
 def constants(scenario: Scenario) -> np.ndarray:
-    """The record of a scenario, an array of one.
-
-    A strength model is `level - slope ln(max(d, floor)^2)` in dB, or `level exp(-slope ln(max(d, floor)^2))` in power.
-    """
-    d, m, r, t = scenario.detection, scenario.measurement, scenario.radio, scenario.tracking
-    bit = m if isinstance(m, Binary) else Binary()
-    if isinstance(m, Position):
-        level, slope, noise, floor = 0.0, 0.0, m.noise_m, 0.0
-    elif isinstance(m, Rssi):
-        level, slope, noise, floor = m.reference_dbm, 5 * m.exponent / math.log(10), m.noise_db, m.floor_m
-    elif isinstance(m, Binary):
-        level, slope, noise, floor = 0.0, 0.0, m.edge_m, 0.0
-    else:
-        level, slope, noise, floor = m.amplitude, m.exponent / 2, m.noise, m.floor_m
-    record = np.zeros(1, CONSTANTS)
+    """The record of a scenario, an array of one."""
+    r, t = scenario.radio, scenario.tracking
+    record = sensing_constants(scenario.detection, scenario.measurement)
     values = dict(
         period_s=scenario.period_s,
         side_m=scenario.field.side_m,
-        radius_m=d.radius_m,
-        inner_m=(1 - d.softness) * d.radius_m,
-        reach_m=d.reach_m,
-        decay=d.decay,
-        ceiling=d.ceiling,
-        decay_power=d.decay_power,
-        edge_power=d.edge_power,
-        model=m.code,
-        level=level,
-        slope=slope,
-        noise=noise,
-        floor_m=floor,
-        flip=bit.flip if scenario.binary else 0.0,
-        edge_m=bit.edge_m,
-        every_presence=bit.reports == "presence",
-        refresh=bit.refresh,
         ring_m=scenario.ring_m,
-        tx_j_per_bit=1e-9 * r.tx_nj_per_bit,
-        amplifier_j_per_bit_m2=1e-12 * r.amplifier_pj_per_bit_m2,
-        rx_j_per_bit=1e-9 * r.rx_nj_per_bit,
+        tx_j_per_bit=r.tx_j_per_bit,
+        amplifier_j_per_bit_m2=r.amplifier_j_per_bit_m2,
+        rx_j_per_bit=r.rx_j_per_bit,
         report_bits=r.report_bits,
         invitation_bits=r.invitation_bits,
         handover_bits=scenario.handover_bits,
@@ -107,15 +86,49 @@ def constants(scenario: Scenario) -> np.ndarray:
         tries=1 + r.retries,
         delivery=r.delivery,
         receiver=RECEIVERS.index(r.receiver),
-        sensing_j=1e-9 * r.sensing_nj,
+        awake_j=r.awake_j(scenario.period_s),
+        asleep_j=r.asleep_j(scenario.period_s),
+        hop_m=r.hop_m,
         q=scenario.filter_q,
         pooled=t.fusion == "pooled",
         silent_information=t.silent_information,
         resample_below=t.resample_below,
+        spread_scale=t.spread_scale if t.resampling == "spread" else 0.0,
+        redraw=t.redraw_on_handover,
         search=t.search,
         log_search_miss=math.log(t.search_miss),
         search_gap=t.search_gap,
     )
-    for name in CONSTANTS.names:
-        record[name] = values[name]
+    for name, value in values.items():
+        record[name] = value
+    return record
+
+
+def sensing_constants(detection: Detection | Threshold, measurement: Measurement) -> np.ndarray:
+    """The part of the record that says what nodes sense, an array of one; zero elsewhere.
+
+    A strength model is `level - slope ln(max(d, floor)^2) - absorption max(d, floor)` in dB, or
+    `level exp(-slope ln(max(d, floor)^2))` in power.
+    """
+    d, m = detection, measurement
+    radius, reach = d.distances_m(m)
+    values = dict(detection=d.code, radius_m=radius, reach_m=reach, model=m.code)
+    if isinstance(d, Threshold):
+        values |= dict(threshold_db=d.threshold_db)
+    else:
+        values |= dict(inner_m=(1 - d.softness) * radius, decay=d.decay, ceiling=d.ceiling)
+        values |= dict(decay_power=d.decay_power, edge_power=d.edge_power)
+    if isinstance(m, Position):
+        values |= dict(noise=m.noise_m)
+    elif isinstance(m, Level):
+        values |= dict(level=m.at_1m_db, slope=5 * m.exponent / math.log(10), absorption=m.absorption_db_per_m)
+        values |= dict(noise=m.noise_db, floor_m=m.floor_m)
+    elif isinstance(m, Binary):
+        values |= dict(noise=m.edge_m, flip=m.flip, edge_m=m.edge_m, refresh=m.refresh)
+        values |= dict(every_presence=m.reports == "presence")
+    else:
+        values |= dict(level=m.amplitude, slope=m.exponent / 2, noise=m.noise, floor_m=m.floor_m)
+    record = np.zeros(1, CONSTANTS)
+    for name, value in values.items():
+        record[name] = value
     return record

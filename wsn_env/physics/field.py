@@ -14,6 +14,16 @@ def scatter(stream, side_m, positions):
         positions[i, 1] = side_m * draws.uniform(stream, 2 * i + 1)
 
 
+@piece
+def lay_out(stream, side_m, jitter, positions):
+    """Draw the positions (S, 2), S a square number: each within `jitter` cells of the middle of its own cell [m]."""
+    across = int(np.round(np.sqrt(len(positions))))
+    cell = side_m / across
+    for i in range(len(positions)):
+        positions[i, 0] = cell * (i % across + 0.5 + jitter * (2.0 * draws.uniform(stream, 2 * i) - 1.0))
+        positions[i, 1] = cell * (i // across + 0.5 + jitter * (2.0 * draws.uniform(stream, 2 * i + 1) - 1.0))
+
+
 @lean_piece
 def squared_distance(positions, i, x, y):
     """Squared distance of node i to (x, y) [m^2]."""

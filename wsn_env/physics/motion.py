@@ -16,8 +16,9 @@ from wsn_env.quantity import ScenarioError
 from wsn_env.scenario import Scenario
 from wsn_env.sections import MOTIONS, Legs, Recorded
 
-CROSSING, STRAIGHT, SINE, CIRCLE, TURNS, WAYPOINT, RECORDED, LEGS = range(len(MOTIONS))
+CROSSING, STRAIGHT, SINE, CIRCLE, TURNS, WAYPOINT, CRUISE, RECORDED, LEGS = range(len(MOTIONS))
 CROSSING_TRIES = 100
+CRUISE_TRIES = 1000
 CODES = dict(zip(MOTIONS.values(), range(len(MOTIONS))))
 
 
@@ -49,6 +50,19 @@ def _check_room(scenario: Scenario) -> None:
                 f"Crossing.crossing_m = {motion.crossing_m}: must be at most {0.9 * room:.1f} m in a field of {side} m"
                 f" with a margin of {motion.margin_m} m"
             )
+    if name == "Cruise":
+        if motion.inset_m < motion.margin_m or motion.inset_m >= side / 2:
+            raise ScenarioError(
+                f"Cruise.inset_m = {motion.inset_m}: must be at least margin_m = {motion.margin_m} and below half the"
+                f" side, {side / 2} m"
+            )
+        room = side - motion.inset_m - motion.margin_m
+        fastest = room / (scenario.periods * scenario.period_s)
+        if motion.speed_ms > fastest:
+            raise ScenarioError(
+                f"Cruise.speed_ms = {motion.speed_ms}: must be at most {fastest:.4g} m/s, from the inner field to the"
+                f" margin in {scenario.periods} periods"
+            )
     if name in ("Turns", "Waypoint") and motion.speed_ms * scenario.period_s > side:
         raise ScenarioError(
             f"{name}.speed_ms = {motion.speed_ms}: must be at most {side / scenario.period_s} m/s, a side of the field"
@@ -77,6 +91,8 @@ def draw_track(code, numbers, recordings, stream, period_s, side_m, track):
         _turn(stream, numbers[0], numbers[1], period_s, side_m, track)
     elif code == WAYPOINT:
         _visit(stream, numbers[0], period_s, side_m, track)
+    elif code == CRUISE:
+        _cruise(stream, numbers[0], numbers[1], numbers[2], numbers[3], period_s, side_m, track)
     else:  # recorded, or of straight legs
         track[:] = recordings[int(draws.uniform(stream, 0) * len(recordings))]
     for state in track:
@@ -214,6 +230,26 @@ def _visit(stream, speed_ms, period_s, side_m, track):
         distance = np.sqrt((goal_x - x) ** 2 + (goal_y - y) ** 2)
         scale = speed_ms / distance if distance > 0.0 else 0.0
         track[k] = np.array((x, scale * (goal_x - x), y, scale * (goal_y - y)))
+
+
+@piece
+def _cruise(stream, speed_ms, acceleration_ms2, inset_m, margin_m, period_s, side_m, track):
+    steps = len(track) - 1
+    inner, first = side_m - 2.0 * inset_m, 0
+    for attempt in range(2 * CRUISE_TRIES):  # the first that stays inside; after CRUISE_TRIES without noise
+        sd = acceleration_ms2 if attempt < CRUISE_TRIES else 0.0
+        s, c = sincos(4.0 * HALF_PI * draws.uniform(stream, first + 2))
+        x, y = inset_m + inner * draws.uniform(stream, first), inset_m + inner * draws.uniform(stream, first + 1)
+        track[0] = np.array((x, speed_ms * c, y, speed_ms * s))
+        inside = True
+        for k in range(steps):
+            ax, ay = draws.normal_pair(stream, first // 2 + 2 + k)
+            advance(track[k], period_s, sd * ax, sd * ay, track[k + 1])
+            inside &= margin_m <= track[k + 1, 0] <= side_m - margin_m
+            inside &= margin_m <= track[k + 1, 2] <= side_m - margin_m
+        if inside:
+            return
+        first += 4 + 2 * steps
 
 
 def walk_legs(scenario: Scenario) -> np.ndarray:

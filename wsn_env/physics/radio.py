@@ -1,10 +1,13 @@
 """What talking costs: sender and receiver pay for every try, a node gives no more than it has.
 
-Reports may be lost and are tried again (assumption d of Xiang & Guo, 2013); control packets always arrive. A sink in
-the middle of the field and the target's own node have energy of their own, so that only the network's side is on the
-books: who reports to them pays for sending, who is called by them pays for hearing it. All pieces work on row b of the
-state and of the period's outcome.
+A radio reaches every node at a price that grows with distance (eq. 5); a modem sends over one hop at one price. Reports
+may be lost and are tried again (assumption d of Xiang & Guo, 2013); control packets always arrive. A sink in the middle
+of the field and the target's own node have energy of their own, so that only the network's side is on the books: who
+reports to them pays for sending, who is called by them pays for hearing it. All pieces work on row b of the state and
+of the period's outcome.
 """
+
+import numpy as np
 
 from wsn_env import draws
 from wsn_env.compiling import lean_piece
@@ -47,6 +50,12 @@ def transmission(bits, squared, c):
 
 
 @lean_piece
+def in_one_hop(node, other, positions, c):
+    """Whether a packet goes from node to node at once."""
+    return squared_distance(positions, node, positions[other, 0], positions[other, 1]) <= c.hop_m * c.hop_m
+
+
+@lean_piece
 def send(sender, receiver, bits, purpose, state, outcome, b, c):
     """One packet from node to node (eq. 5). Returns whether both could pay, so that it arrived if not lost."""
     positions, battery = state.network.positions[b], state.network.battery[b]
@@ -66,10 +75,19 @@ def send_out(sender, x, y, bits, purpose, state, outcome, b, c):
 
 @lean_piece
 def report(node, head, target, purpose, state, outcome, b, c):
-    """A node's report with its retries. Returns whether it was received; to the head its own is free."""
-    if c.receiver == TO_HEAD and (node == head or state.network.battery[b, head] <= 0.0):
-        return node == head and state.network.battery[b, head] > 0.0
-    x, y = target if c.receiver == TO_TARGET else (0.5 * c.side_m, 0.5 * c.side_m)
+    """A node's report with its retries. Returns whether it was received; to the head its own is free.
+
+    Beyond one hop nothing is sent: after a search the new head may lie so far, for a modem.
+    """
+    positions = state.network.positions[b]
+    if c.receiver == TO_HEAD:
+        x, y = positions[head, 0], positions[head, 1]
+        if state.network.battery[b, head] <= 0.0 or node == head:
+            return state.network.battery[b, head] > 0.0
+    else:
+        x, y = target if c.receiver == TO_TARGET else (0.5 * c.side_m, 0.5 * c.side_m)
+    if squared_distance(positions, node, x, y) > c.hop_m * c.hop_m:
+        return False
     packet = draws.SEARCH_PACKET if purpose == SEARCH else draws.PACKET
     stream = draws.stream(state.key[b], state.row[b].period, packet)
     for attempt in range(c.tries):
@@ -104,6 +122,21 @@ def broadcast(state, outcome, b, c):
 
 
 @lean_piece
+def _hand_over(old, head, state, outcome, b, c):
+    """The old head's packet to the new one; beyond one hop it is relayed, each time at the old head's expense.
+
+    Returns: as `send`.
+    """
+    positions, battery = state.network.positions[b], state.network.battery[b]
+    squared = squared_distance(positions, old, positions[head, 0], positions[head, 1])
+    hops = max(np.ceil(np.sqrt(squared) / c.hop_m), 1.0)
+    sending = hops * transmission(c.handover_bits, squared, c)
+    if battery[old] <= 0.0 or not spend(old, sending, HANDOVER, state, outcome, b):
+        return False
+    return battery[head] > 0.0 and spend(head, c.handover_bits * c.rx_j_per_bit, HANDOVER, state, outcome, b)
+
+
+@lean_piece
 def form(head, chosen, count, state, outcome, b, c):
     """Make the chosen cluster the standing one: handover from the old head, invitations to new members.
 
@@ -121,7 +154,7 @@ def form(head, chosen, count, state, outcome, b, c):
     changed = old != head
     if c.receiver != TO_HEAD:
         return _call(head, chosen, count, state, outcome, b, c)
-    handed = changed and old >= 0 and send(old, head, c.handover_bits, HANDOVER, state, outcome, b, c)
+    handed = changed and old >= 0 and _hand_over(old, head, state, outcome, b, c)
     n, j = 0, 0
     for k in range(count):
         node = chosen[k]

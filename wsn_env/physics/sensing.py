@@ -7,17 +7,21 @@ import numpy as np
 
 from wsn_env import draws
 from wsn_env.compiling import lean_kernel, lean_piece
-from wsn_env.numerics import exp, log
-from wsn_env.physics.constants import CONSTANTS
+from wsn_env.numerics import exp, log, normal_cdf
+from wsn_env.physics.constants import sensing_constants
 from wsn_env.physics.field import squared_distance
-from wsn_env.sections import Binary, Detection, Position
+from wsn_env.sections import Binary, Detection, Measurement, Position, Threshold
 
 POSITION, BINARY = Position.code, Binary.code
 
 
 @lean_piece
 def detection_piece(distance, c):
-    """Eqs. 2-3 for one distance [m] and a record of constants."""
+    """Eqs. 2-3, or that of a threshold, for one distance [m] and a record of constants."""
+    if c.detection == 1:
+        if distance >= c.reach_m:
+            return 0.0
+        return normal_cdf((strength(distance * distance, c) - c.threshold_db) / c.noise)
     if distance <= c.inner_m:
         return c.ceiling
     if distance >= c.reach_m:
@@ -34,26 +38,28 @@ def _detection_probabilities(constants, distances, out):
         out[i] = detection_piece(distances[i], c)
 
 
-def detection_probability(distance, detection: Detection):
+def detection_probability(distance, detection: Detection | Threshold, measurement: Measurement = Position()):  # noqa: B008
     """Probability that a node detects the target.
 
         p(d) = l2                                    d <= (1 - delta) r
                l2 exp(-l1 a1**b1 / a2**b2)           in between
                0                                     d >= (1 + delta) r
 
-    with a1 = d - (1 - delta) r and a2 = (1 + delta) r - d. Xiang & Guo (2013), eqs. 2-3.
+    with a1 = d - (1 - delta) r and a2 = (1 + delta) r - d. Xiang & Guo (2013), eqs. 2-3. With a threshold
+
+        p(d) = Phi((h(d) - threshold) / sigma)       where that is at least 1e-6; 0 beyond
+
+    with h(d) the mean level and sigma the noise of what is measured.
 
     Args:
         distance: (...,) m, target to node.
-        detection: radius_m (r), softness (delta), decay (l1), ceiling (l2), decay_power (b1), edge_power (b2).
+        detection: radius_m (r), softness (delta), decay (l1), ceiling (l2), decay_power (b1), edge_power (b2); or
+            threshold_db.
+        measurement: what a node measures; only a threshold asks.
 
-    Returns: (...,) probability in [0, ceiling].
+    Returns: (...,) probability.
     """
-    record = np.zeros(1, CONSTANTS)
-    record["inner_m"] = (1 - detection.softness) * detection.radius_m
-    record["reach_m"] = detection.reach_m
-    for name in ("decay", "ceiling", "decay_power", "edge_power"):
-        record[name] = getattr(detection, name)
+    record = sensing_constants(detection, measurement)
     distance = np.asarray(distance, dtype=float)
     out = np.empty(distance.size)
     _detection_probabilities(record, np.ascontiguousarray(distance).ravel(), out)
@@ -73,24 +79,29 @@ def joint_detection_probability(probabilities):
 
 
 @lean_piece
-def detects(key, period, node, distance, c):
-    """Whether a node, if awake, detects the target in this period."""
-    p = detection_piece(distance, c)
+def detects(key, period, node, squared, c):
+    """Whether a node, if awake, detects the target at a squared distance [m^2] in this period."""
+    if c.detection == 1:
+        return measured_strength(key, period, node, squared, c) > c.threshold_db
+    p = detection_piece(np.sqrt(squared), c)
     return p > 0.0 and draws.uniform(draws.stream(key, period, draws.DETECTION), node) < p
 
 
 @lean_piece
-def tells(key, period, node, distance, c):
+def tells(key, period, node, squared, c):
     """Whether a node takes the target to be there: it detects, unless it misreads its one bit."""
     misread = c.flip > 0.0 and draws.uniform(draws.stream(key, period, draws.MISREADING), node) < c.flip
-    return detects(key, period, node, distance, c) != misread
+    return detects(key, period, node, squared, c) != misread
 
 
 @lean_piece
 def strength(squared, c):
     """Noise-free strength at a squared distance [m^2], in dB or in power."""
-    fall = c.slope * log(max(squared, c.floor_m * c.floor_m, 1e-12))
-    return c.level - fall if c.model == 1 else c.level * exp(-fall)
+    near = max(squared, c.floor_m * c.floor_m, 1e-12)
+    fall = c.slope * log(near)
+    if c.model == 2:
+        return c.level * exp(-fall)
+    return c.level - fall - (c.absorption * np.sqrt(near) if c.model == 3 else 0.0)
 
 
 @lean_piece

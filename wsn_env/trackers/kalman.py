@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from wsn_env.scenario import Scenario
-from wsn_env.sections import Position, Rssi
+from wsn_env.sections import Level, Position
 from wsn_env.types import Belief, Network, Reports
 
 
@@ -51,7 +51,7 @@ class EKFTracker:
                 value, HJacobian=lambda x: POSITION_ROWS, Hx=lambda x: x[[0, 2]], R=m.noise_m**2 * np.eye(2)
             )
             return
-        noise = m.noise_db if isinstance(m, Rssi) else m.noise
+        noise = m.noise_db if isinstance(m, Level) else m.noise
         self._filter.update(
             value[:1],
             HJacobian=lambda x: self._strength(x, node)[1],
@@ -65,9 +65,10 @@ class EKFTracker:
         offset = x[[0, 2]] - node
         squared = max(float(offset @ offset), m.floor_m**2, 1e-12)
         flat = offset @ offset < m.floor_m**2
-        if isinstance(m, Rssi):
-            level = m.reference_dbm - 5 * m.exponent * math.log10(squared)
-            slope = -10 * m.exponent / math.log(10) / squared
+        if isinstance(m, Level):
+            distance, absorption = math.sqrt(squared), m.absorption_db_per_m
+            level = m.at_1m_db - 5 * m.exponent * math.log10(squared) - absorption * distance
+            slope = -10 * m.exponent / math.log(10) / squared - absorption / distance
         else:
             level = m.amplitude * squared ** (-m.exponent / 2)
             slope = -m.exponent * level / squared

@@ -5,20 +5,20 @@ vector registers of any width and the bits stay the same.
 """
 
 import numpy as np
-from numba import int32, uint32
+from numba import int32
 
 from wsn_env import draws
 from wsn_env.compiling import inline_piece, kernel, lean_kernel, lean_piece, piece
 from wsn_env.draws import normal_pair32
-from wsn_env.numerics import F, exp, exp32, expm1_32, f32_bits, f32_from_bits, log, log32
-from wsn_env.sections import Binary, Position, Rssi, RssiPower
+from wsn_env.numerics import F, exp, exp32, expm1_32, f32_bits, f32_from_bits, log, log32, log_normal_cdf32
+from wsn_env.sections import Binary, Position, Rssi, RssiPower, Sonar
+from wsn_env.trackers.resampling import REACH, correlated, lower_root, resample, spread_copies
 from wsn_env.types import Belief, Reports, network_of
 
 LANES = 16
-BLOCK = 8  # particles whose weights are summed apart when resampling
-REACH = 16  # slots of the running maximum's widest window
 SUMS = 16  # w, w^2, four of w d, ten of w d d'
-POSITION, STRENGTH, POWER, BINARY = Position.code, Rssi.code, RssiPower.code, Binary.code
+POSITION, STRENGTH, POWER = Position.code, Rssi.code, RssiPower.code
+SONAR, BINARY = Sonar.code, Binary.code
 LOG_LEAST, LOG_MOST = F(-13.815510558), F(-1.0000005e-6)  # p in [1e-6, 1 - 1e-6]: no report rules a particle out
 TINY = F(1e-30)
 
@@ -76,6 +76,14 @@ def weigh(x, log_weights, first, step, position, value, c):
             dy = py[i] - sy
             r = (z - level) + slope * log32(max(dx * dx + dy * dy, floor))
             log_weights[i] -= half_precision * (r * r)
+    elif c.model == SONAR:
+        absorption = F(c.absorption)
+        for i in range(first, n, step):
+            dx = px[i] - sx
+            dy = py[i] - sy
+            near = max(dx * dx + dy * dy, floor)
+            r = (z - level) + (slope * log32(near) + absorption * np.sqrt(near))
+            log_weights[i] -= half_precision * (r * r)
     else:
         log_floor = log32(floor)
         top = F(c.level * exp(-c.slope * np.float64(log_floor)) / c.noise)  # at the floor, the greatest there is
@@ -89,7 +97,7 @@ def weigh(x, log_weights, first, step, position, value, c):
 
 @lean_piece
 def weigh_awake(x, log_weights, network, nodes, b, c):
-    """Add what it tells that of the awake nodes of row b just `nodes` (m,) reported, whatever they measured.
+    """Add what it tells that of the awake nodes of row b just `nodes` (m,) reported, beside what they measured.
 
     The head's own report is always heard, a member's with probability `delivery`. A node without energy tells nothing.
     """
@@ -101,10 +109,14 @@ def weigh_awake(x, log_weights, network, nodes, b, c):
         reported = False
         for other in nodes:
             reported |= other == node
-        if reported:
+        delivery = 1.0 if k < 0 else c.delivery
+        if c.detection == 1:  # a report's value tells all; that it came adds nothing
+            if not reported and battery[node] > 0.0:
+                weigh_quiet(x, log_weights, positions[node], delivery, c)
+        elif reported:
             weigh_detection(x, log_weights, positions[node], c)
         elif battery[node] > 0.0:
-            weigh_silence(x, log_weights, positions[node], 1.0 if k < 0 else c.delivery, c)
+            weigh_silence(x, log_weights, positions[node], delivery, c)
 
 
 @lean_piece
@@ -192,6 +204,32 @@ def weigh_state(x, log_weights, position, detects, c):
         dy = py[i] - sy
         y = slope * (radius - np.sqrt(dx * dx + dy * dy))
         log_weights[i] += log32(least + rest / (F(1) + exp32(min(y, F(80)))))
+
+
+@lean_piece
+def weigh_quiet(x, log_weights, position, delivery, c):
+    """Add the log probability that nothing was heard of the awake node at `position`, with a threshold.
+
+        ln Phi((threshold - h(d)) / sigma)               delivery = 1: the level was below the threshold
+        ln(1 - delivery + delivery Phi(...))             else: or the report was lost
+
+    Args:
+        delivery: probability that a report of the node arrives; 1 for the head.
+    """
+    px, py = x[0], x[2]
+    sx, sy = F(position[0]), F(position[1])
+    per_sd = 1.0 / max(c.noise, 1e-10)
+    below = F((c.threshold_db - c.level) * per_sd)
+    slope, absorption, floor = F(c.slope * per_sd), F(c.absorption * per_sd), F(max(c.floor_m * c.floor_m, 1e-12))
+    sent, lost = F(delivery), F(1.0 - delivery)
+    for i in range(x.shape[1]):
+        dx = px[i] - sx
+        dy = py[i] - sy
+        near = max(dx * dx + dy * dy, floor)
+        quiet = log_normal_cdf32(below + (slope * log32(near) + absorption * np.sqrt(near)))
+        if lost > F(0):
+            quiet = log32(min(lost + sent * exp32(quiet), F(1)))
+        log_weights[i] += quiet
 
 
 @lean_piece
@@ -295,76 +333,6 @@ def _gather(w, d0, d1, d2, d3, lanes, k):
 
 
 @lean_piece
-def resample(u, x, log_weights, weights, total, slots, states):
-    """Systematic resampling in place, without a search.
-
-    Args:
-        u: U[0, 1), the common offset of the slots.
-        weights: (P,) summing to `total`.
-        slots: (3, P + 16) int32 scratch, the first 16 of each are zeros.
-        states: (2, P) complex128 scratch.
-    """
-    inherit(u, weights, total, slots[0], slots[1], slots[2])
-    draw(x, slots[2, REACH:], states[0], states[1])
-    log_weights[:] = F(0)
-
-
-@lean_piece
-def inherit(u, weights, total, ended, recent, ancestors):
-    """Find every slot's ancestor: the particle after the last one that ends before the slot.
-
-    Ends ascend, so of the particles that end at one place the last to be written stays. What is left is a running
-    maximum: over 4 slots, over 16, and over all in strides of 16, in vectors (one number after the other it would be a
-    branch that nobody can foretell). Sums restart with every block, so that blocks need not wait for each other.
-
-    Args:
-        ended, recent: (P + 16,) scratch; 0 or one more than the last particle that ends there, from 3 and 12 on.
-        ancestors: (P + 16,) filled from 16 on; 0 before.
-    """
-    n = len(weights)
-    for k in range(n + 4):
-        ended[k] = 0
-    scale = np.float64(n) / total
-    base = 1.0 - u
-    last = int32(n)
-    whole = (n - 1) // BLOCK * BLOCK
-    for o in range(0, whole, BLOCK):
-        cumulated = 0.0
-        for k in range(BLOCK):
-            cumulated += np.float64(weights[o + k]) * scale
-            ended[uint32(3) + uint32(min(int32(base + cumulated), last))] = int32(o + k + 1)
-        base += cumulated
-    for i in range(whole, n - 1):
-        base += np.float64(weights[i]) * scale
-        ended[uint32(3) + uint32(min(int32(base), last))] = int32(i + 1)
-    for k in range(n):
-        recent[k + 12] = max(max(ended[k], ended[k + 1]), max(ended[k + 2], ended[k + 3]))
-    for k in range(n):
-        here = max(max(recent[k], recent[k + 4]), max(recent[k + 8], recent[k + 12]))
-        ancestors[k + REACH] = max(here, ancestors[k])
-
-
-@lean_piece
-def draw(x, ancestors, states, drawn):
-    """Replace every particle by its ancestor; its four numbers move as one of 16 bytes."""
-    n = x.shape[1]
-    px, vx, py, vy = x[0], x[1], x[2], x[3]
-    before, after = states.view(np.float32), drawn.view(np.float32)
-    for i in range(n):
-        before[4 * i] = px[i]
-        before[4 * i + 1] = vx[i]
-        before[4 * i + 2] = py[i]
-        before[4 * i + 3] = vy[i]
-    for k in range(n):
-        drawn[k] = states[uint32(ancestors[k])]  # unsigned: no wrap-around to provide for
-    for k in range(n):
-        px[k] = after[4 * k]
-        vx[k] = after[4 * k + 1]
-        py[k] = after[4 * k + 2]
-        vy[k] = after[4 * k + 3]
-
-
-@lean_piece
 def relocate(stream, mean, cov, x):
     """Draw the particles' positions anew ~ N(mean, cov); velocities and weights stay."""
     sx, sy = F(np.sqrt(cov[0, 0])), F(np.sqrt(cov[2, 2]))
@@ -422,7 +390,21 @@ def filter_row(key, period, belief, network, reports, b, c, room):
     if resampled:
         u = draws.uniform(draws.stream(key, period, draws.RESAMPLING), 0)
         resample(u, x, log_weights, weights, total, slots, states)
+        if c.spread_scale > 0.0:
+            spread_copies(draws.stream(key, period, draws.SPREAD), slots[2, REACH:], c.spread_scale, row.cov, x)
     return resampled
+
+
+@lean_piece
+def redraw_row(key, period, belief, b):
+    """The new head of row b draws its particles from the mean and covariance handed over, with equal weights."""
+    x, mean, root = belief.particles[b], belief.row[b].mean, lower_root(belief.row[b].cov)
+    stream = draws.stream(key, period, draws.HANDOVER)
+    for i in range(x.shape[1]):
+        d0, d1, d2, d3 = correlated(stream, i, root)
+        x[0, i], x[1, i] = F(mean[0]) + d0, F(mean[1]) + d1
+        x[2, i], x[3, i] = F(mean[2]) + d2, F(mean[3]) + d3
+    belief.log_weights[b, :] = F(0)
 
 
 @piece

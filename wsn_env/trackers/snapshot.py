@@ -16,7 +16,7 @@ class SnapshotTracker:
     def __init__(self, scenario: Scenario):
         m = scenario.measurement
         self._positions_reported = isinstance(m, Position)
-        self._variance = m.noise_m**2 if self._positions_reported else scenario.detection.radius_m**2 / 2
+        self._variance = m.noise_m**2 if self._positions_reported else scenario.radius_m**2 / 2
         self._growth = scenario.period_s**2
 
     def start(self, keys, periods, rows, belief: Belief) -> None:
