@@ -207,9 +207,8 @@ PRESETS = {
     ),
     "Anchors-v0": Scenario(
         name="Anchors-v0",
-        lam=3.0,
-        typical_error_m=10.0,
-        typical_energy_mj=0.7,
+        lam=10.0,
+        typical_error_m=11.0,
         periods=50,
         field=Field(side_m=200.0, positions=RING_OF_EIGHT),
         motion=Crossing(margin_m=20.0, crossing_m=80.0, acceleration_ms2=0.5),

@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium import spaces
 
 from wsn_env.compiling import lean_kernel, lean_piece
-from wsn_env.interface.merit import ORDERS, order_by_information
+from wsn_env.interface.merit import ORDERS, order_by_merit
 from wsn_env.physics.constants import constants
 from wsn_env.quantity import suggest
 from wsn_env.scenario import Scenario
@@ -44,7 +44,8 @@ class MenuAction:
         if self._order == "nearest":
             return nodes
         ordered, kept = np.empty_like(nodes), np.where(_moves.py_func(actions, view.head), -1, view.head)
-        order_by_information(0, len(nodes), self._constants, view.positions, kept, view.belief, nodes, ordered)
+        lam = view.lam.copy() if self._order == "value" else np.zeros(len(nodes))
+        order_by_merit(0, len(nodes), self._constants, view.positions, kept, view.belief, lam, nodes, ordered)
         return ordered
 
     def masks(self, view: View) -> np.ndarray:

@@ -1,14 +1,15 @@
-"""The order in which candidates are worth waking: nearest first, or by information gain."""
+"""The order in which candidates are worth waking: nearest first, by information, or by information less its price."""
 
 import numpy as np
 
 from wsn_env.compiling import kernel, lean_piece
 from wsn_env.numerics import exp, normal_cdf
 from wsn_env.physics.field import squared_distance
+from wsn_env.physics.radio import TO_HEAD, TO_SINK, transmission
 from wsn_env.physics.sensing import BINARY, detection_piece, strength
 
 TWO_PI = 6.283185307179586
-ORDERS = ("nearest", "information")
+ORDERS = ("nearest", "information", "value")
 
 
 @lean_piece
@@ -78,11 +79,31 @@ def _edge(dx, dy, cov, c):
     return h0, h1, along * (1.0 - told) / max(told, 1e-12)
 
 
+@lean_piece
+def _price_mj(detection, positions, node, head, mean, cov, c):
+    """Expected energy of a node's being awake for the period instead of asleep, and of its report [mJ].
+
+    The report goes to the head, or as far as the prediction where the head is still open; to the sink; to the target.
+    """
+    if c.receiver == TO_SINK:
+        squared = squared_distance(positions, node, 0.5 * c.side_m, 0.5 * c.side_m)
+    elif c.receiver == TO_HEAD and head >= 0:
+        squared = squared_distance(positions, node, positions[head, 0], positions[head, 1])
+    else:
+        squared = squared_distance(positions, node, mean[0], mean[2]) + cov[0, 0] + cov[2, 2]
+    report = transmission(c.report_bits, squared, c) + (
+        c.report_bits * c.rx_j_per_bit if c.receiver == TO_HEAD else 0.0
+    )
+    return 1e3 * (detection * report + c.awake_j - c.asleep_j)
+
+
 @kernel
-def order_by_information(start, stop, cs, positions, heads, beliefs, nodes, ordered):
-    """Greedy order of the candidates: each next one is the best after those before it.
+def order_by_merit(start, stop, cs, positions, heads, beliefs, lams, nodes, ordered):
+    """Greedy order of the candidates: each next one is the best after those before it, by the drop of the root of the
+    position covariance's trace that it brings [m], less lam times its price.
 
     Args:
+        lams: (B,) m/mJ; 0: by information alone.
         heads: (B,) a head that senses anyhow and is conditioned on first; -1: none.
         nodes: (B, K) candidates, -1: none.
         ordered: (B, K) filled; -1 at the end where candidates are missing or are the head.
@@ -102,12 +123,15 @@ def order_by_information(start, stop, cs, positions, heads, beliefs, nodes, orde
             if not used[k]:
                 detections[k] = mean_detection(positions[b], nodes[b, k], mean, cov, c)
         for slot in range(size):
-            best, most, after = -1, -1.0, (p00, p01, p11)
+            best, most, after = -1, -np.inf, (p00, p01, p11)
             for k in range(size):
                 if not used[k]:
                     g, q00, q01, q11 = gain(detections[k], positions[b], nodes[b, k], mean, cov, p00, p01, p11, c)
-                    if g > most:
-                        best, most, after = k, g, (q00, q01, q11)
+                    value = np.sqrt(p00 + p11) - np.sqrt(max(p00 + p11 - g, 0.0))
+                    if lams[b] > 0.0:
+                        value -= lams[b] * _price_mj(detections[k], positions[b], nodes[b, k], heads[b], mean, cov, c)
+                    if value > most:
+                        best, most, after = k, value, (q00, q01, q11)
             if best < 0:
                 break
             used[best] = True
