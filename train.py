@@ -50,7 +50,7 @@ class Training:
     set: list[str] = field(default_factory=list)
     """Scenario quantities, as name=value: nodes=400 particles=1000."""
     order: str = "nearest"
-    """The menu's order of merit: nearest | information."""
+    """The menu's order of merit: nearest | information | value."""
     reward: str = "belief"
     """Training reward: belief (what the filter expects, low variance) | error (the true error)."""
 

@@ -26,7 +26,7 @@ class ClusterEnv(gym.Env):
         action: "menu" | "subset" | "nodes" | "cluster".
         observation: "candidates" | "dict" | "view".
         reward: "error" (the mission's) | "belief" (lower variance, for training only).
-        order: "nearest" | "information", the menu's order of merit.
+        order: "nearest" | "information" | "value", the menu's order of merit.
         candidates: K, how many nodes actions and observations consider.
         render_mode: None | "rgb_array".
         fast: a quicker particle filter, equal to rounding, whose bits differ from processor to processor.

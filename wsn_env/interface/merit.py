@@ -91,9 +91,9 @@ def _price_mj(detection, positions, node, head, mean, cov, c):
         squared = squared_distance(positions, node, positions[head, 0], positions[head, 1])
     else:
         squared = squared_distance(positions, node, mean[0], mean[2]) + cov[0, 0] + cov[2, 2]
-    report = transmission(c.report_bits, squared, c) + (
-        c.report_bits * c.rx_j_per_bit if c.receiver == TO_HEAD else 0.0
-    )
+    report = transmission(c.report_bits, squared, c)
+    if c.receiver == TO_HEAD:
+        report += c.report_bits * c.rx_j_per_bit
     return 1e3 * (detection * report + c.awake_j - c.asleep_j)
 
 
