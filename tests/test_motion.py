@@ -158,6 +158,62 @@ def test_motions_without_room_are_refused(overrides, names):
     assert names in str(problem.value) and "must be" in str(problem.value)
 
 
+# --- straight legs ------------------------------------------------------------------------------------------
+
+
+def legs(start, *pieces, **overrides):
+    return tracks(motion="legs", start_m=start, legs=pieces, **overrides)[0]
+
+
+def test_legs_are_walked_one_after_the_other_and_then_the_target_stands():
+    track = legs((20, 15), (4, 5, 2), (2, -1, 3), periods=8)
+    np.testing.assert_allclose(track[:, 0], [20, 25, 30, 35, 40, 39, 38, 38, 38])
+    np.testing.assert_allclose(track[:, 2], [15, 17, 19, 21, 23, 26, 29, 29, 29])
+    np.testing.assert_array_equal(track[:, 1], [5, 5, 5, 5, 5, -1, -1, 0, 0])
+    np.testing.assert_array_equal(track[:, 3], [2, 2, 2, 2, 2, 3, 3, 0, 0])
+
+
+def test_a_turn_within_a_period_cuts_no_corner():
+    pieces = (12.5, 3, 1), (12.5, -2, 1), (25, 0.5, -0.5)
+    fine = legs((20, 15), *pieces, periods=500, period_s=0.1)
+    for period_s, stride in ((0.2, 2), (0.5, 5), (1.0, 10)):
+        coarse = legs((20, 15), *pieces, periods=int(50 / period_s), period_s=period_s)
+        np.testing.assert_allclose(coarse[:, ::2], fine[::stride, ::2], atol=1e-9)
+
+
+def test_legs_are_the_same_for_every_key_and_may_touch_the_border():
+    overrides = dict(motion="legs", side_m=500, start_m=(0, 500), legs=((50, 10, -10),), periods=500, period_s=0.1)
+    some = tracks(3, key=7, **overrides)
+    assert (some == some[0]).all()
+    np.testing.assert_allclose(some[0, :, 0], np.linspace(0, 500, 501), atol=1e-9)
+    np.testing.assert_allclose(some[0, :, 2], np.linspace(500, 0, 501), atol=1e-9)
+    assert (some[0, :, 1] == 10).all() and (some[0, :, 3] == -10).all()  # not turned by the border's mirror
+
+
+@pytest.mark.parametrize(
+    ("overrides", "says"),
+    [
+        (dict(legs=()), ["Legs.legs = ()", "triples"]),
+        (dict(legs=((1, 2),)), ["Legs.legs = ((1, 2),)", "triples"]),
+        (dict(legs=((1, 2, 3), (1, 2))), ["Legs.legs", "triples"]),
+        (dict(legs=(1, 2, 3)), ["Legs.legs = (1, 2, 3)", "triples"]),
+        (dict(legs="ten"), ["Legs.legs = 'ten'", "triples"]),
+        (dict(legs=((1, 2, np.nan),)), ["Legs.legs", "finite"]),
+        (dict(legs=((0, 2, 3),)), ["Legs.legs = ((0, 2, 3),)", "longer than 0 s"]),
+        (dict(legs=((5, 1, 1), (-1, 2, 3))), ["Legs.legs", "longer than 0 s"]),
+        (dict(start_m=5), ["Legs.start_m = 5", "pair"]),
+        (dict(start_m=(1, 2, 3)), ["Legs.start_m = (1, 2, 3)", "pair"]),
+        (dict(start_m=(1, np.inf)), ["Legs.start_m", "finite"]),
+        (dict(start_m=(101, 5), legs=((1, -1, 0),)), ["Legs.legs", "(101.0, 5.0) m at 0 s", "in the field 0..100.0 m"]),
+        (dict(start_m=(0, 50), legs=((9, 1, 0), (2, -5, 0))), ["Legs.legs", "(-1.0, 50.0) m at 11 s"]),
+    ],
+)
+def test_bad_legs_are_refused(overrides, says):
+    with pytest.raises(ScenarioError) as problem:
+        tracks(motion="legs", **overrides)
+    assert all(word in str(problem.value) for word in says), problem.value
+
+
 # --- recorded tracks ----------------------------------------------------------------------------------------
 
 

@@ -14,9 +14,9 @@ from wsn_env.compiling import piece
 from wsn_env.numerics import HALF_PI, sincos
 from wsn_env.quantity import ScenarioError
 from wsn_env.scenario import Scenario
-from wsn_env.sections import MOTIONS, Recorded
+from wsn_env.sections import MOTIONS, Legs, Recorded
 
-CROSSING, STRAIGHT, SINE, CIRCLE, TURNS, WAYPOINT, RECORDED = range(len(MOTIONS))
+CROSSING, STRAIGHT, SINE, CIRCLE, TURNS, WAYPOINT, RECORDED, LEGS = range(len(MOTIONS))
 CROSSING_TRIES = 100
 CODES = dict(zip(MOTIONS.values(), range(len(MOTIONS))))
 
@@ -28,6 +28,8 @@ def motion_parameters(scenario: Scenario) -> tuple[int, np.ndarray, np.ndarray]:
     recordings = np.zeros((1, scenario.periods + 1, 4))
     if isinstance(motion, Recorded):
         recordings = np.stack([read_track(path, scenario) for path in motion.tracks])
+    elif isinstance(motion, Legs):
+        recordings = walk_legs(scenario)[None]
     else:
         values = [getattr(motion, item.name) for item in fields(motion)]
         numbers[: len(values)] = values
@@ -75,7 +77,7 @@ def draw_track(code, numbers, recordings, stream, period_s, side_m, track):
         _turn(stream, numbers[0], numbers[1], period_s, side_m, track)
     elif code == WAYPOINT:
         _visit(stream, numbers[0], period_s, side_m, track)
-    else:
+    else:  # recorded, or of straight legs
         track[:] = recordings[int(draws.uniform(stream, 0) * len(recordings))]
     for state in track:
         _reflect(state, 0, side_m)
@@ -212,6 +214,34 @@ def _visit(stream, speed_ms, period_s, side_m, track):
         distance = np.sqrt((goal_x - x) ** 2 + (goal_y - y) ** 2)
         scale = speed_ms / distance if distance > 0.0 else 0.0
         track[k] = np.array((x, scale * (goal_x - x), y, scale * (goal_y - y)))
+
+
+def walk_legs(scenario: Scenario) -> np.ndarray:
+    """The track (periods + 1, 4) of straight legs; it may touch the border, rounding errors there are cut off.
+
+    Raises:
+        ScenarioError: the track leaves the field within the horizon.
+    """
+    motion, side = scenario.motion, scenario.field.side_m
+    legs = np.array(motion.legs + ((np.inf, 0.0, 0.0),))  # at last it stands still
+    ends = np.cumsum(legs[:, 0])
+    begins = np.concatenate(([0.0], ends[:-1]))
+    corners = motion.start_m + np.concatenate(([[0.0, 0.0]], np.cumsum(legs[:-1, :1] * legs[:-1, 1:], axis=0)))
+    time = scenario.period_s * np.arange(scenario.periods + 1)
+    leg = np.searchsorted(ends, time - 1e-9 * scenario.period_s)
+    points = corners[leg] + (time - begins[leg])[:, None] * legs[leg, 1:]
+    outside = np.flatnonzero(((points < -1e-9 * side) | (points > (1 + 1e-9) * side)).any(axis=1))
+    if outside.size:
+        k = outside[0]
+        there = tuple(points[k].tolist())
+        raise ScenarioError(
+            f"Legs.legs = {motion.legs!r}: lead from {motion.start_m} to {there} m at {time[k]:g} s: must stay in"
+            f" the field 0..{side} m for the horizon"
+        )
+    track = np.empty((len(time), 4))
+    track[:, ::2] = np.clip(points, 0.0, side)
+    track[:, 1::2] = legs[leg, 1:]
+    return track
 
 
 def read_track(path: str, scenario: Scenario) -> np.ndarray:
