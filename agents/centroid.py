@@ -22,10 +22,10 @@ class Centroid(ViewPolicy):
 
     def act(self, view: View) -> Cluster:
         """Follow, for every row."""
-        count = view.detected.sum(axis=1)
+        count = view.sees.sum(axis=1)
         centre = view.mean[:, ::2].copy()
         for axis in (0, 1):
-            total = np.cumsum(np.where(view.detected, view.positions[:, :, axis], 0.0), axis=1)[:, -1]
+            total = np.cumsum(np.where(view.sees, view.positions[:, :, axis], 0.0), axis=1)[:, -1]
             centre[:, axis] = np.where(count > 0, total / np.maximum(count, 1), centre[:, axis])
         distance = np.where(view.alive, distances_to(view.positions, centre), np.inf)
         stay = (count == 0) & (view.head >= 0)

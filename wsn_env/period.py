@@ -143,7 +143,9 @@ def _sense(node, head, purpose, target, state, outcome, b, c):
     if battery[node] <= 0.0:
         return
     value = sensing.tells(key, period, node, distance, c)
-    has_news = _update_state(node, value, purpose, state, b, c) if c.model == sensing.BINARY else value
+    has_news, changed = value, False
+    if c.model == sensing.BINARY:
+        has_news, changed = _update_state(node, value, purpose, state, b, c)
     if not has_news:
         return
     outcome.row[b].detections += 1
@@ -152,7 +154,7 @@ def _sense(node, head, purpose, target, state, outcome, b, c):
         reports.node[b, slot] = node
         if c.model == sensing.BINARY:
             reports.value[b, slot, 0] = value
-            reports.value[b, slot, 1] = 0.0
+            reports.value[b, slot, 1] = changed
             reports.bitmap[b, node] = value
         else:
             sensing.measure(key, period, node, positions, target, c, reports.value[b, slot])
@@ -161,7 +163,8 @@ def _sense(node, head, purpose, target, state, outcome, b, c):
 
 @lean_piece
 def _update_state(node, value, purpose, state, b, c):
-    """A binary sensor compares what it senses with what it sensed last. Returns whether it has to report.
+    """A binary sensor compares what it senses with what it sensed last. Returns whether it has to report, and
+    whether its state has changed.
 
     In a search everybody is asked, and silence means 0; so it does where every presence is reported.
     """
@@ -169,8 +172,8 @@ def _update_state(node, value, purpose, state, b, c):
     state.sensed[b, node] = value
     if c.every_presence or purpose == radio.SEARCH:
         state.reports.bitmap[b, node] = 0
-        return value
-    return changed or (c.refresh > 0 and state.row[b].period % c.refresh == 0)
+        return value, changed
+    return changed or (c.refresh > 0 and state.row[b].period % c.refresh == 0), changed
 
 
 @lean_piece

@@ -9,8 +9,10 @@ import numpy as np
 
 from wsn_env.quantity import NUMBERS, ScenarioError, Section, quantity, suggest
 from wsn_env.sections import (
+    BOUNDARY_TRACKERS,
     MEASUREMENTS,
     MOTIONS,
+    TRACKERS,
     Binary,
     Crossing,
     Detection,
@@ -20,6 +22,7 @@ from wsn_env.sections import (
     Position,
     Radio,
     Rssi,
+    RssiPower,
     Tracking,
 )
 
@@ -34,6 +37,10 @@ KINDS = {
     "radio": (Radio,),
     "tracking": (Tracking,),
 }
+
+# Which measurements a tracker can read.
+READS = dict.fromkeys(TRACKERS, (Position, Rssi, RssiPower)) | dict.fromkeys(BOUNDARY_TRACKERS, (Binary,))
+READS["particle"] = tuple(MEASUREMENTS.values())
 
 
 @dataclass(frozen=True)
@@ -57,9 +64,25 @@ class Scenario(Section):
             value = getattr(self, name)
             if not isinstance(value, kinds):
                 raise ScenarioError(f"Scenario.{name} = {value!r}: must be a {' or '.join(k.__name__ for k in kinds)}")
+        self._check_tracker()
         low, high = self.lam_range
         if not (np.isfinite([low, high]).all() and 0 <= low <= high) or (low == 0) != (high == 0):
             raise ScenarioError(f"Scenario.lam = {self.lam!r}: must be at least 0 m/mJ, or a pair 0 < low <= high")
+
+    def _check_tracker(self) -> None:
+        name, kind = self.tracking.tracker, type(self.measurement)
+        if kind not in READS[name]:
+            able = ", ".join(tracker for tracker, kinds in READS.items() if kind in kinds)
+            raise ScenarioError(f"Tracking.tracker = {name!r}: cannot read {kind.__name__} reports: allowed are {able}")
+        if name in BOUNDARY_TRACKERS and not name.startswith("centroid") and self.measurement.reports != "changes":
+            raise ScenarioError(
+                f"Binary.reports = {self.measurement.reports!r}: allowed is 'changes' with the tracker {name!r}"
+            )
+        if self.binary and self.tracking.silent_information:
+            raise ScenarioError(
+                "Tracking.silent_information = True: allowed is False with Binary reports, whose bitmap already tells"
+                " who keeps silent"
+            )
 
     @property
     def lam_range(self) -> tuple[float, float]:
@@ -126,18 +149,20 @@ class Scenario(Section):
         for item in fields(self):
             if item.name in changes:
                 whole[item.name] = changes.pop(item.name)
-        scenario = replace(self, **whole)
-        for item in fields(scenario):
-            section = getattr(scenario, item.name)
+        known: dict[str, Any] = {}
+        for item in fields(self):
+            section = whole.get(item.name, getattr(self, item.name))
             if is_dataclass(section):
-                own = {part.name for part in fields(section)} & changes.keys()
-                if own:
-                    new = replace(section, **{key: changes.pop(key) for key in own})
-                    scenario = replace(scenario, **{item.name: new})
+                own = {part.name for part in fields(section)}
+                known |= dict.fromkeys(own)
+                if own & changes.keys():
+                    whole[item.name] = replace(section, **{key: changes.pop(key) for key in own & changes.keys()})
+            else:
+                known[item.name] = None
         if changes:
             name = next(iter(changes))
-            raise ScenarioError(f"scenario has no quantity {name!r}: {suggest(name, scenario.quantities())}")
-        return scenario
+            raise ScenarioError(f"scenario has no quantity {name!r}: {suggest(name, known)}")
+        return replace(self, **whole)  # at once: a tracker and what it reads may change together
 
     def quantities(self) -> dict[str, Any]:
         """Every quantity of every section by name."""

@@ -291,8 +291,8 @@ class Radio(Section):
     retries: int = quantity(3, "further tries of a lost report", at_least=0, at_most=15, whole=True)
     receiver: str = quantity(
         "head",
-        "who hears the awake nodes: the cluster's head; a sink on mains in the middle of the field; or the target, whose"
-        " own node hears their beacons",
+        "who hears the awake nodes: the cluster's head; a sink on mains in the middle of the field; or the target,"
+        " whose own node hears their beacons",
         choices=("head", "sink", "target"),
     )
     sensing_nj: float = quantity(0.0, "energy of an awake node's sensing, per period", at_least=0)
@@ -315,11 +315,20 @@ class Radio(Section):
 # --- how the target is tracked -----------------------------------------------------------------------------
 
 
+BOUNDARY_TRACKERS = ("boundary_raw", "boundary", "boundary_mid", "boundary_ekf", "centroid", "centroid_rls")
+TRACKERS = {  # name: where the class stands
+    "particle": "wsn_env.trackers.particle:ParticleTracker",
+    "ekf": "wsn_env.trackers.kalman:EKFTracker",
+    "snapshot": "wsn_env.trackers.snapshot:SnapshotTracker",
+    **dict.fromkeys(BOUNDARY_TRACKERS, "wsn_env.trackers.boundary:BoundaryTracker"),
+}
+
+
 @dataclass(frozen=True)
 class Tracking(Section):
     """The filter at the head, and the search rule for lost tracks."""
 
-    tracker: str = quantity("particle", "particle | ekf | snapshot", choices=("particle", "ekf", "snapshot"))
+    tracker: str = quantity("particle", " | ".join(TRACKERS), choices=tuple(TRACKERS))
     particles: int = quantity(5000, "number of particles P", at_least=2, at_most=1_000_000, whole=True)
     fusion: str = quantity("joint", "joint (members send z) or pooled (eqs. 9-15)", choices=("joint", "pooled"))
     silent_information: bool = quantity(
@@ -333,6 +342,12 @@ class Tracking(Section):
         "sd of the filter's acceleration noise [m/s^2]; None: what suits the motion",
         at_least=0,
         at_most=1000,
+        optional=True,
+    )
+    gate_m: float | None = quantity(
+        None,
+        "trackers of binary sensors refuse what is off the prediction by more than this and three sds; None: nothing",
+        above=0,
         optional=True,
     )
     start: str = quantity("known", "known: mean ~ N(truth, P0); search: from a search", choices=("known", "search"))

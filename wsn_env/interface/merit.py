@@ -3,8 +3,8 @@
 import numpy as np
 
 from wsn_env.compiling import kernel, lean_piece
-from wsn_env.physics.field import squared_distance
 from wsn_env.numerics import exp, normal_cdf
+from wsn_env.physics.field import squared_distance
 from wsn_env.physics.sensing import BINARY, detection_piece, strength
 
 TWO_PI = 6.283185307179586

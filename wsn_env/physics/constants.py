@@ -49,6 +49,7 @@ CONSTANTS = np.dtype(
         ("sensing_j", "f8"),
         # tracking
         ("q", "f8"),
+        ("gate_m", "f8"),  # inf: none
         ("pooled", "i8"),
         ("silent_information", "i8"),
         ("resample_below", "f8"),
@@ -109,6 +110,7 @@ def constants(scenario: Scenario) -> np.ndarray:
         receiver=RECEIVERS.index(r.receiver),
         sensing_j=1e-9 * r.sensing_nj,
         q=scenario.filter_q,
+        gate_m=math.inf if t.gate_m is None else t.gate_m,
         pooled=t.fusion == "pooled",
         silent_information=t.silent_information,
         resample_below=t.resample_below,

@@ -186,7 +186,8 @@ def nearest(network, points, count: int, ring_m: float = 0.0, threads: int = 1):
         count: K.
         ring_m: radius of the ring; 0: the point itself.
 
-    Returns: (B, K) indices in order of nearness, -1 where fewer are alive; (B, K) distances to the point in m, inf there.
+    Returns: (B, K) indices in order of nearness, -1 where fewer are alive; (B, K) distances to the point in m, inf
+        there.
     """
     rows = len(points)
     nodes, distances = np.empty((rows, count), np.int64), np.empty((rows, count))

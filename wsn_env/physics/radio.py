@@ -1,9 +1,9 @@
 """What talking costs: sender and receiver pay for every try, a node gives no more than it has.
 
-Reports may be lost and are tried again (assumption d of Xiang & Guo, 2013); control packets always arrive. A sink in the
-middle of the field and the target's own node have energy of their own, so that only the network's side is on the books:
-who reports to them pays for sending, who is called by them pays for hearing it. All pieces work on row b of the state
-and of the period's outcome.
+Reports may be lost and are tried again (assumption d of Xiang & Guo, 2013); control packets always arrive. A sink in
+the middle of the field and the target's own node have energy of their own, so that only the network's side is on the
+books: who reports to them pays for sending, who is called by them pays for hearing it. All pieces work on row b of the
+state and of the period's outcome.
 """
 
 from wsn_env import draws

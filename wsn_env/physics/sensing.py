@@ -12,7 +12,6 @@ from wsn_env.physics.constants import CONSTANTS
 from wsn_env.physics.field import squared_distance
 from wsn_env.sections import Binary, Detection, Position
 
-
 POSITION, BINARY = Position.code, Binary.code
 
 

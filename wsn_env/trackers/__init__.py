@@ -1,19 +1,12 @@
 """Trackers: belief and reports in, belief out. `make_tracker` finds them by name."""
 
+from pkgutil import resolve_name
+
 from wsn_env.scenario import Scenario
+from wsn_env.sections import TRACKERS
+from wsn_env.types import Tracker
 
 
-def make_tracker(scenario: Scenario, threads: int = 1, fast: bool = False):
+def make_tracker(scenario: Scenario, threads: int = 1, fast: bool = False) -> Tracker:
     """The tracker that a scenario names."""
-    name = scenario.tracking.tracker
-    if name == "particle":
-        from wsn_env.trackers.particle import ParticleTracker
-
-        return ParticleTracker(scenario, threads, fast)
-    if name == "ekf":
-        from wsn_env.trackers.kalman import EKFTracker
-
-        return EKFTracker(scenario)
-    from wsn_env.trackers.snapshot import SnapshotTracker
-
-    return SnapshotTracker(scenario)
+    return resolve_name(TRACKERS[scenario.tracking.tracker])(scenario, threads, fast)

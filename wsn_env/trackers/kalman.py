@@ -18,7 +18,7 @@ class EKFTracker:
 
     particles = 0
 
-    def __init__(self, scenario: Scenario):
+    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
         from filterpy.kalman import ExtendedKalmanFilter  # takes a second or two to import
 
         t, q = scenario.period_s, scenario.filter_q
