@@ -12,8 +12,9 @@ that the boundary nodes lie on a circle about the middle of the target's way. Ho
     centroid       the mean of all awake nodes that detect; no memory
     centroid_rls   recursive least squares over it
 
-Fewer than four boundary nodes make no circle: then the centroid stands in (but for boundary_mid). None, or neither: the
-filter only predicts.
+Fewer than four boundary nodes make no circle: then the centroid stands in (but for boundary_mid). Without any the filter
+only predicts. With a gate, boundary nodes and fixes that are too far from what is expected are refused, and the centroid
+stands in for what is missing then, too.
 
 Differs from the paper: eqs. 12 and 13 as printed leave out F P F', and then the velocity is never learnt; eq. 11 has
 x(k+1) for x(k); the last row of eq. 6 lacks its minus signs.
@@ -78,12 +79,14 @@ def correct_rows(start, stop, cs, variant, searched, periods, beliefs, *arrays):
     for b in range(start, stop):
         belief = beliefs[b]
         take_prediction(belief)
-        nodes = room[: list_boundary(belief, network, reports, room, b, cs[0])]
+        gate = expect_circle(belief, network, reports.bitmap[b], b, cs[0])
+        n, told = list_boundary(gate, network.positions[b], reports, room, b, cs[0])
         if variant == RANGES:
-            update_by_ranges(belief, network.positions[b], nodes, cs[0])
+            update_by_ranges(belief, network.positions[b], room[:n], cs[0])
         else:
             restarts = searched and periods[b] == 1
-            update_by_position(belief, network, reports.bitmap[b], nodes, restarts, variant, b, cs[0])
+            bitmap = reports.bitmap[b]
+            update_by_position(belief, network, bitmap, room[:n], told, gate, restarts, variant, b, cs[0])
 
 
 @lean_piece
@@ -159,45 +162,48 @@ def circle_centre(positions, nodes):
 
 
 @lean_piece
-def list_boundary(belief, network, reports, nodes, b, c):
-    """The boundary nodes that pass the gate, in `nodes`; their number."""
-    n = 0
-    for k in range(reports.count[b]):
-        node, changed = reports.node[b, k], reports.value[b, k, 1]
-        if changed != 0.0 and not _strays(node, belief, network.positions[b], c):
-            nodes[n] = node
-            n += 1
-    return n
-
-
-@lean_piece
 def middle(mean, c):
     """(x, y) half a period ago [m]."""
     return mean[0] - 0.5 * c.period_s * mean[1], mean[2] - 0.5 * c.period_s * mean[3]
 
 
 @lean_piece
-def _strays(node, belief, positions, c):
-    """Whether a boundary node stands too far from the circle predicted."""
+def expect_circle(belief, network, bitmap, b, c):
+    """The gate: x, y where the circle's centre is expected and how far off it may be [m], for gate_m and three sds.
+
+    By the prediction or by the centroid, whichever is sharper: before a filter has learnt a velocity, the centroid.
+    """
+    if c.gate_m == np.inf:
+        return 0.0, 0.0, np.inf
     x, y = middle(belief.predicted_mean, c)
-    return _refuses(np.sqrt(squared_distance(positions, node, x, y)) - c.radius_m, belief, c)
+    variance = max(belief.predicted_cov[0, 0], belief.predicted_cov[2, 2])
+    cx, cy, spread = centroid(network, bitmap, b, c)
+    if 0.0 < spread[0] < variance:
+        x, y, variance = cx, cy, spread[0]
+    return x, y, c.gate_m + GATE_SDS * np.sqrt(variance)
 
 
 @lean_piece
-def _refuses(offset, belief, c):
-    """The gate: whether an offset from what is predicted [m] exceeds gate_m and three predicted sds."""
-    cov = belief.predicted_cov
-    return abs(offset) > c.gate_m + GATE_SDS * np.sqrt(max(cov[0, 0], cov[2, 2]))
+def list_boundary(gate, positions, reports, nodes, b, c):
+    """The boundary nodes that stand close enough to the circle expected, in `nodes`; their number, and how many there
+    were in all."""
+    n, told = 0, 0
+    for k in range(reports.count[b]):
+        node, changed = reports.node[b, k], reports.value[b, k, 1]
+        if changed != 0.0:
+            told += 1
+            if abs(np.sqrt(squared_distance(positions, node, gate[0], gate[1])) - c.radius_m) <= gate[2]:
+                nodes[n] = node
+                n += 1
+    return n, told
 
 
 @lean_piece
-def update_by_position(belief, network, bitmap, nodes, restarts, variant, b, c):
-    """Correct with a fix or a centroid, if there is one that the gate lets pass."""
-    mean, cov, half = belief.mean, belief.cov, 0.5 * c.period_s
-    x, y, spread = _locate(belief, network, bitmap, nodes, variant, b, c)
-    ahead = half if variant == MIDPOINT else 0.0  # how much older than the period's end the position is
-    dx, dy = x - mean[0] + ahead * mean[1], y - mean[2] + ahead * mean[3]
-    if spread[0] == 0.0 or _refuses(np.sqrt(dx * dx + dy * dy), belief, c):
+def update_by_position(belief, network, bitmap, nodes, told, gate, restarts, variant, b, c):
+    """Correct with a fix or a centroid, if there is one."""
+    mean, cov = belief.mean, belief.cov
+    x, y, spread, age = locate(belief, network, bitmap, nodes, told, gate, variant, b, c)
+    if spread[0] == 0.0:
         return
     if variant == RAW or variant == CENTROID:
         _stand_at(x, y, spread, mean, cov)
@@ -207,36 +213,42 @@ def update_by_position(belief, network, bitmap, nodes, restarts, variant, b, c):
             cov[i, i] = UNKNOWN
         mean[0], mean[1], mean[2], mean[3] = x, 0.0, y, 0.0
     else:
-        scalar_update(mean, cov, (1.0, -ahead, 0.0, 0.0), dx, FIX_VARIANCE)
-        dy = y - mean[2] + ahead * mean[3]
-        scalar_update(mean, cov, (0.0, 0.0, 1.0, -ahead), dy, FIX_VARIANCE)
+        scalar_update(mean, cov, (1.0, -age, 0.0, 0.0), x - mean[0] + age * mean[1], FIX_VARIANCE)
+        scalar_update(mean, cov, (0.0, 0.0, 1.0, -age), y - mean[2] + age * mean[3], FIX_VARIANCE)
 
 
 @lean_piece
-def _locate(belief, network, bitmap, nodes, variant, b, c):
-    """Where the target is by this period's reports alone: x, y [m] and the covariance xx, xy, yy; zeros: it is not
-    told.
+def locate(belief, network, bitmap, nodes, told, gate, variant, b, c):
+    """Where the target is by this period's reports alone.
 
-    The covariance is that of boundary nodes that are off the circle by the radial part of an instant uniform in the
+    The covariance of a fix is that of nodes that are off the circle by the radial part of an instant uniform in the
     period: on average over those met, of variance (|v| T)^2 / 18, and 1 m^2.
+
+    Returns: x, y [m], the covariance xx, xy, yy, zeros where it is not told, and how long ago that was [s].
     """
     mean, half = belief.mean, 0.5 * c.period_s
     if variant < CENTROID:
+        refused = told > len(nodes)
         if len(nodes) >= FEWEST:
             x, y, condition, inverse = circle_centre(network.positions[b], nodes)
             if condition <= (WELL_CONDITIONED if variant == MIDPOINT else SINGULAR):
-                if variant != MIDPOINT:  # the same sign for nodes that were entered and left
-                    x, y = x + half * mean[1], y + half * mean[3]
-                way = (mean[1] ** 2 + mean[3] ** 2) * c.period_s**2
-                scale = c.radius_m**2 * (1.0 + way / 18.0)
-                return x, y, (scale * inverse[0], scale * inverse[1], scale * inverse[2])
-        if variant == MIDPOINT or len(nodes) == 0:
-            return 0.0, 0.0, (0.0, 0.0, 0.0)
-    return _centroid(network, bitmap, b, c)
+                if np.sqrt((x - gate[0]) ** 2 + (y - gate[1]) ** 2) <= gate[2]:
+                    way = (mean[1] ** 2 + mean[3] ** 2) * c.period_s**2
+                    scale = c.radius_m**2 * (1.0 + way / 18.0)
+                    spread = scale * inverse[0], scale * inverse[1], scale * inverse[2]
+                    if variant == MIDPOINT:
+                        return x, y, spread, half
+                    # The same sign for nodes that were entered and left.
+                    return x + half * mean[1], y + half * mean[3], spread, 0.0
+                refused = True
+        if told == 0 or (variant == MIDPOINT and not refused):
+            return 0.0, 0.0, (0.0, 0.0, 0.0), 0.0
+    x, y, spread = centroid(network, bitmap, b, c)  # seldom far off: so a filter that is finds back
+    return x, y, spread, 0.0
 
 
 @lean_piece
-def _centroid(network, bitmap, b, c):
+def centroid(network, bitmap, b, c):
     """Mean of the awake nodes that detect, each uniform in a disc: variance R^2 / (4 n) on an axis."""
     positions, standing, members = network.positions[b], network.row[b], network.members[b]
     x, y, n = 0.0, 0.0, 0
