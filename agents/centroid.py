@@ -1,4 +1,4 @@
-"""The cluster follows the centroid of the nodes that detected last."""
+"""The cluster follows the centroid of the nodes that detect."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from wsn_env.view import View
 
 @dataclass(frozen=True)
 class Centroid(ViewPolicy):
-    """Head: the living node nearest to the centroid of the nodes that detected last; members: the living nodes within
-    the sensing radius of it. No motion model.
+    """Head: the living node nearest to the centroid of the nodes that detected last (binary sensors: that are last known
+    to detect); members: the living nodes within the sensing radius of it. No motion model.
 
-    Without a detection in the last period the cluster stays; with no cluster yet, the estimate stands for the centroid.
+    Without a detection the cluster stays; with no cluster yet, the estimate stands for the centroid.
     """
 
     def act(self, view: View) -> Cluster:

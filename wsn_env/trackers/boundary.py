@@ -12,9 +12,9 @@ that the boundary nodes lie on a circle about the middle of the target's way. Ho
     centroid       the mean of all awake nodes that detect; no memory
     centroid_rls   recursive least squares over it
 
-Fewer than four boundary nodes make no circle: then the centroid stands in (but for boundary_mid). Without any the filter
-only predicts. With a gate, boundary nodes and fixes that are too far from what is expected are refused, and the centroid
-stands in for what is missing then, too.
+Fewer than four boundary nodes make no circle: then the centroid stands in (but for boundary_mid). Without any, a filter
+only predicts. With a gate, boundary nodes and fixes too far from what is expected are refused; the centroid stands in
+for the fix that is missing then, and so leads a filter back that has gone astray.
 
 Differs from the paper: eqs. 12 and 13 as printed leave out F P F', and then the velocity is never learnt; eq. 11 has
 x(k+1) for x(k); the last row of eq. 6 lacks its minus signs.
@@ -243,7 +243,7 @@ def locate(belief, network, bitmap, nodes, told, gate, variant, b, c):
                 refused = True
         if told == 0 or (variant == MIDPOINT and not refused):
             return 0.0, 0.0, (0.0, 0.0, 0.0), 0.0
-    x, y, spread = centroid(network, bitmap, b, c)  # seldom far off: so a filter that is finds back
+    x, y, spread = centroid(network, bitmap, b, c)
     return x, y, spread, 0.0
 
 
