@@ -4,21 +4,28 @@ import numpy as np
 from hypothesis import strategies as st
 
 from wsn_env import Cluster, Scenario, World
+from wsn_env.scenario import READS
+from wsn_env.sections import BOUNDARY_TRACKERS, MEASUREMENTS
 
+TRACKERS = ("particle", "particle", "ekf", "snapshot", *BOUNDARY_TRACKERS)
 MOTIONS = ["crossing", "straight", "sine", "circle", "turns", "waypoint"]
 KEYS = st.integers(0, 2**64 - 1)
 
 
 @st.composite
-def scenarios(draw, trackers=("particle", "particle", "ekf", "snapshot"), **fixed):
+def scenarios(draw, trackers=TRACKERS, **fixed):
     """Small scenarios of every kind: lossy, short of energy, lost from the start, without any noise in the filter."""
-    overrides = dict(
+    readable = {name: [t for t in trackers if kind in READS[t]] for name, kind in MEASUREMENTS.items()}
+    measurement = fixed.get("measurement", draw(st.sampled_from([name for name in MEASUREMENTS if readable[name]])))
+    tracker = fixed.get("tracker", draw(st.sampled_from(readable[measurement])))
+    overrides = draw(binary_sensors(tracker)) if measurement == "binary" else {}
+    overrides |= dict(
         nodes=draw(st.integers(1, 60)),
         side_m=draw(st.sampled_from([60.0, 100.0, 140.0])),
         periods=draw(st.integers(3, 25)),
         lam=draw(st.sampled_from([4.0, 0, (0.3, 30)])),
         motion=draw(st.sampled_from(MOTIONS)),
-        measurement=draw(st.sampled_from(["position", "rssi", "rssi_power"])),
+        measurement=measurement,
         radius_m=draw(st.sampled_from([3.0, 10.0, 40.0])),
         ceiling=draw(st.sampled_from([0.6, 1.0])),
         packet_success=draw(st.sampled_from([1.0, 0.9, 0.3, 0.0])),
@@ -26,7 +33,9 @@ def scenarios(draw, trackers=("particle", "particle", "ekf", "snapshot"), **fixe
         sensing_nj=draw(st.sampled_from([0.0, 1500.0])),
         battery_j=draw(st.sampled_from([1.0, 1e-3, 2e-4, 5e-5, 1e-6])),
         handover=draw(st.sampled_from(["estimate", "estimate", "particles"])),
-        tracker=draw(st.sampled_from(trackers)),
+        receiver=draw(st.sampled_from(["head", "head", "sink", "target"])),
+        tracker=tracker,
+        gate_m=draw(st.sampled_from([None, None, 2.0, 20.0])),
         particles=draw(st.sampled_from([2, 3, 16, 17, 50, 300])),
         fusion=draw(st.sampled_from(["joint", "pooled"])),
         silent_information=draw(st.sampled_from([False, False, True])),
@@ -38,8 +47,20 @@ def scenarios(draw, trackers=("particle", "particle", "ekf", "snapshot"), **fixe
         search_gap=draw(st.integers(1, 6)),
     )
     overrides |= fixed
-    overrides["silent_information"] &= overrides["tracker"] == "particle"
+    overrides["silent_information"] &= tracker == "particle" and measurement != "binary"
     return Scenario.named("PreDC-v0", **overrides)
+
+
+@st.composite
+def binary_sensors(draw, tracker):
+    """What binary sensors have of their own; those that tell of their presence serve no tracker of the boundary."""
+    modes = ["changes"] if tracker.startswith("boundary") else ["changes", "presence"]
+    return dict(
+        reports=draw(st.sampled_from(modes)),
+        refresh=draw(st.sampled_from([0, 0, 1, 3])),
+        flip=draw(st.sampled_from([0.0, 0.01, 0.4])),
+        edge_m=draw(st.sampled_from([1.0, 0.01, 20.0])),
+    )
 
 
 def choices(seed, period, rows, nodes):
