@@ -10,7 +10,7 @@ KEYS = st.integers(0, 2**64 - 1)
 
 
 @st.composite
-def scenarios(draw, trackers=("particle", "particle", "ekf", "snapshot"), **fixed):
+def scenarios(draw, trackers=("particle", "particle", "particle", "ekf", "ukf", "ickf", "snapshot"), **fixed):
     """Small scenarios of every kind: lossy, short of energy, lost from the start, without any noise in the filter."""
     overrides = dict(
         nodes=draw(st.integers(1, 60)),
@@ -32,7 +32,7 @@ def scenarios(draw, trackers=("particle", "particle", "ekf", "snapshot"), **fixe
         silent_information=draw(st.sampled_from([False, False, True])),
         resample_below=draw(st.sampled_from([2 / 3, 2 / 3, 0, 1])),
         filter_q=draw(st.sampled_from([None, 0, 0.5])),
-        start=draw(st.sampled_from(["known", "known", "search"])),
+        start=draw(st.sampled_from(["known", "known", "search", "field", "fix"])),
         start_sd_m=draw(st.sampled_from([1.0, 1e-6, 12.0])),
         search=draw(st.sampled_from([True, True, False])),
         search_gap=draw(st.integers(1, 6)),
