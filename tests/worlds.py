@@ -7,7 +7,7 @@ from wsn_env import Cluster, Scenario, World
 from wsn_env.scenario import READS
 from wsn_env.sections import BOUNDARY_TRACKERS, MEASUREMENTS
 
-TRACKERS = ("particle", "particle", "ekf", "snapshot", *BOUNDARY_TRACKERS)
+TRACKERS = ("particle", "particle", "particle", "ekf", "ukf", "ickf", "snapshot", *BOUNDARY_TRACKERS)
 MOTIONS = ["crossing", "straight", "sine", "circle", "turns", "waypoint"]
 KEYS = st.integers(0, 2**64 - 1)
 
@@ -41,7 +41,7 @@ def scenarios(draw, trackers=TRACKERS, **fixed):
         silent_information=draw(st.sampled_from([False, False, True])),
         resample_below=draw(st.sampled_from([2 / 3, 2 / 3, 0, 1])),
         filter_q=draw(st.sampled_from([None, 0, 0.5])),
-        start=draw(st.sampled_from(["known", "known", "search"])),
+        start=draw(st.sampled_from(["known", "known", "search", "field", "fix"])),
         start_sd_m=draw(st.sampled_from([1.0, 1e-6, 12.0])),
         search=draw(st.sampled_from([True, True, False])),
         search_gap=draw(st.integers(1, 6)),

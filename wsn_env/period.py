@@ -6,6 +6,7 @@ from wsn_env import draws
 from wsn_env.compiling import kernel, lean_kernel, lean_piece
 from wsn_env.physics import radio, sensing
 from wsn_env.physics.field import nearest_living, squared_distance
+from wsn_env.physics.motion import predict_moments
 from wsn_env.trackers.kernels import filter_row, scratch
 from wsn_env.types import KEEP_CLUSTER, KEEP_HEAD, Outcome, state_of
 
@@ -357,27 +358,3 @@ def _bury(network, b):
             members[living] = members[k]
             living += 1
     standing.n_members = living
-
-
-@lean_piece
-def predict_moments(mean, cov, t, q, predicted_mean, predicted_cov):
-    """F x and F P F' + q^2 G G' (eq. 16).
-
-    Differs from the paper: as printed, eq. 16 leaves out the spread of the particles, so that E would be constant.
-    """
-    for i in range(4):
-        predicted_mean[i] = mean[i] + (t * mean[i + 1] if i % 2 == 0 else 0.0)
-        for j in range(4):
-            p = cov[i, j]
-            if i % 2 == 0:
-                p += t * cov[i + 1, j]
-            if j % 2 == 0:
-                p += t * cov[i, j + 1]
-                if i % 2 == 0:
-                    p += t * t * cov[i + 1, j + 1]
-            predicted_cov[i, j] = max(p, 0.0) if i == j else p
-    gain = (0.5 * t * t, t)
-    for axis in (0, 2):
-        for i in range(2):
-            for j in range(2):
-                predicted_cov[axis + i, axis + j] += q * q * gain[i] * gain[j]

@@ -39,8 +39,9 @@ KINDS = {
 }
 
 # Which measurements a tracker can read.
-READS = dict.fromkeys(TRACKERS, (Position, Rssi, RssiPower)) | dict.fromkeys(BOUNDARY_TRACKERS, (Binary,))
-READS["particle"] = tuple(MEASUREMENTS.values())
+READS = dict.fromkeys(TRACKERS, (Position, Rssi, RssiPower))
+READS |= dict.fromkeys(("trilateration", "nonlinear_ls", "grnn", "grnn_kf"), (Rssi, RssiPower))
+READS |= dict.fromkeys(BOUNDARY_TRACKERS, (Binary,)) | {"particle": tuple(MEASUREMENTS.values())}
 
 
 @dataclass(frozen=True)
@@ -200,7 +201,7 @@ PRESETS = {
         detection=Detection(radius_m=60.0, softness=1e-6, ceiling=1.0),
         measurement=Binary(),
         radio=Radio(receiver="sink", report_bits=64, invitation_bits=0),
-        tracking=Tracking(filter_q=0.3, start_sd_m=10.0, start_sd_ms=1.0, search_sd_ms=10.0),
+        tracking=Tracking(filter_q=0.3, start_sd_m=10.0, start_sd_ms=1.0, rest_sd_ms=10.0),
     ),
     "Anchors-v0": Scenario(
         name="Anchors-v0",

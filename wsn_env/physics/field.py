@@ -4,6 +4,7 @@ import numpy as np
 
 from wsn_env import draws
 from wsn_env.compiling import lean_kernel, lean_piece, over_rows, piece
+from wsn_env.sections import Field
 
 
 @piece
@@ -12,6 +13,22 @@ def scatter(stream, side_m, positions):
     for i in range(len(positions)):
         positions[i, 0] = side_m * draws.uniform(stream, 2 * i)
         positions[i, 1] = side_m * draws.uniform(stream, 2 * i + 1)
+
+
+def fixed_positions(field: Field):
+    """Where the nodes stand in every episode alike: (S, 2) m, or None where each episode draws its own."""
+    if field.positions is not None:
+        return np.array(field.positions)
+    if field.field_seed is None:
+        return None
+    positions = np.empty((field.nodes, 2))
+    _scatter_by_key(draws.key_of_seed(field.field_seed), field.side_m, positions)
+    return positions
+
+
+@lean_kernel
+def _scatter_by_key(key, side_m, positions):
+    scatter(draws.stream(key, 0, draws.FIELD), side_m, positions)
 
 
 @lean_piece

@@ -10,7 +10,7 @@ from wsn_env.compiling import lean_kernel, lean_piece
 from wsn_env.numerics import exp, log
 from wsn_env.physics.constants import CONSTANTS
 from wsn_env.physics.field import squared_distance
-from wsn_env.sections import Binary, Detection, Position
+from wsn_env.sections import Binary, Detection, Measurement, Position, Rssi
 
 POSITION, BINARY = Position.code, Binary.code
 
@@ -91,6 +91,42 @@ def strength(squared, c):
     """Noise-free strength at a squared distance [m^2], in dB or in power."""
     fall = c.slope * log(max(squared, c.floor_m * c.floor_m, 1e-12))
     return c.level - fall if c.model == 1 else c.level * exp(-fall)
+
+
+def expected_strengths(points, nodes, measurement: Measurement):
+    """Noise-free strengths (eq. 1) of targets at some points, at every node.
+
+    Args:
+        points: (..., 2) m.
+        nodes: (n, 2) m.
+        measurement: Rssi (dB) or RssiPower.
+
+    Returns: (..., n).
+    """
+    offset = np.asarray(points)[..., None, :] - nodes
+    return _strength_law((offset**2).sum(axis=-1), measurement)
+
+
+def strength_slopes(points, nodes, measurement: Measurement):
+    """How the strengths of `expected_strengths` change with x and y [1/m]; 0 nearer than the floor.
+
+    Returns: (..., n, 2).
+    """
+    offset = np.asarray(points)[..., None, :] - nodes
+    squared = (offset**2).sum(axis=-1)
+    if isinstance(measurement, Rssi):
+        fall = 10 * measurement.exponent / np.log(10)
+    else:
+        fall = measurement.exponent * _strength_law(squared, measurement)
+    fall = np.where(squared < measurement.floor_m**2, 0.0, fall) / np.maximum(squared, 1e-12)
+    return -fall[..., None] * offset
+
+
+def _strength_law(squared, measurement: Measurement):
+    squared = np.maximum(squared, max(measurement.floor_m**2, 1e-12))
+    if isinstance(measurement, Rssi):
+        return measurement.reference_dbm - 5 * measurement.exponent * np.log10(squared)
+    return measurement.amplitude * squared ** (-measurement.exponent / 2)
 
 
 @lean_piece

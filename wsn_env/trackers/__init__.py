@@ -6,7 +6,19 @@ from wsn_env.scenario import Scenario
 from wsn_env.sections import TRACKERS
 from wsn_env.types import Tracker
 
+GAUSSIAN = ("ekf", "ukf", "ckf", "ickf", "grnn_kf")  # a mean and a covariance carry what they remember
+
 
 def make_tracker(scenario: Scenario, threads: int = 1, fast: bool = False) -> Tracker:
-    """The tracker that a scenario names."""
-    return resolve_name(TRACKERS[scenario.tracking.tracker])(scenario, threads, fast)
+    """The tracker that a scenario names.
+
+    Raises:
+        ScenarioError: it cannot work on what the nodes measure, or where they stand.
+    """
+    name = scenario.tracking.tracker
+    tracker = resolve_name(TRACKERS[name])(scenario, threads, fast)
+    if scenario.tracking.start == "fix" and name in GAUSSIAN:
+        from wsn_env.trackers.first_fix import FirstFix
+
+        return FirstFix(tracker, scenario)
+    return tracker

@@ -43,8 +43,11 @@ GATE_SDS = 3.0
 class BoundaryTracker:
     """The trackers of this module, by the scenario's `tracker`. Their memory is the belief's mean and covariance.
 
-    After a search recursive least squares knows nothing, P0 = 1e4 I; an episode that starts with one takes its first
+    After a search recursive least squares knows nothing, P0 = 1e4 I; in an episode whose start is not known it takes its
     fix in period 1 for the position, at rest. boundary_ekf goes on from the centroid, P0 = diag(100, 200, 100, 200).
+
+    They suppose that nodes are awake in every period: one that has slept reports a state that it finds changed, though
+    the target may have crossed its edge long ago. Where nodes sleep, the particle filter is the better tracker.
     """
 
     particles = 0
@@ -53,7 +56,7 @@ class BoundaryTracker:
         self._threads = threads
         self._constants = constants(scenario)
         self._variant = BOUNDARY_TRACKERS.index(scenario.tracking.tracker)
-        self._searched = scenario.tracking.start == "search"
+        self._at_rest = scenario.tracking.start != "known"
 
     def start(self, keys, periods, rows, belief: Belief) -> None:
         """Nothing to spread: mean and covariance are the whole belief."""
@@ -66,13 +69,13 @@ class BoundaryTracker:
 
     def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
         """Correct the prediction with the boundary nodes of the period, in place."""
-        how = self._constants, self._variant, self._searched
+        how = self._constants, self._variant, self._at_rest
         arrays = belief.row, *reports, *network.arrays()
         over_rows(correct_rows, len(keys), self._threads, *how, periods, *arrays)
 
 
 @kernel
-def correct_rows(start, stop, cs, variant, searched, periods, beliefs, *arrays):
+def correct_rows(start, stop, cs, variant, at_rest, periods, beliefs, *arrays):
     """One period of every row; `arrays` are the reports' and the network's."""
     reports, network = Reports(*arrays[:4]), network_of(arrays[4:])
     room = np.empty(network.battery.shape[1], np.int32)
@@ -84,7 +87,7 @@ def correct_rows(start, stop, cs, variant, searched, periods, beliefs, *arrays):
         if variant == RANGES:
             update_by_ranges(belief, network.positions[b], room[:n], cs[0])
         else:
-            restarts = searched and periods[b] == 1
+            restarts = at_rest and periods[b] == 1
             bitmap = reports.bitmap[b]
             update_by_position(belief, network, bitmap, room[:n], told, gate, restarts, variant, b, cs[0])
 

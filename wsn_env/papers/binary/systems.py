@@ -34,7 +34,7 @@ class System:
 
 
 SURE = (("start", "known"), ("start_sd_m", 1e-6), ("start_sd_ms", 1e-6))
-CLOUD = (("filter_q", 0.6), ("particles", 5000), ("search_sd_ms", 10.0))
+CLOUD = (("filter_q", 0.6), ("particles", 5000), ("rest_sd_ms", 10.0))
 SYSTEMS = {
     "raw": System("boundary_raw", tracking=SURE),  # the velocity is given
     "paper": System("boundary"),
@@ -98,7 +98,7 @@ class Setting:
             filter_q=0.0,
             search=False,
             start="search",
-            search_sd_ms=1e-6,
+            rest_sd_ms=1e-6,
         )
         return Trial("all", Scenario.named("Binary-v0", **(values | dict(system.tracking))), runs)
 
