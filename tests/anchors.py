@@ -3,6 +3,7 @@
 import numpy as np
 
 from wsn_env import Cluster, Scenario, World
+from wsn_env.sections import Rssi
 
 RING = ((0, 0), (100, 0), (200, 0), (0, 100), (200, 100), (0, 200), (100, 200), (200, 200))
 
@@ -14,8 +15,7 @@ def ring_scenario(**overrides):
         side_m=200.0,
         radius_m=360.0,
         ceiling=1.0,
-        measurement="rssi",
-        exponent=3.0,
+        measurement=Rssi(exponent=3.0),
         battery_j=1e6,
         motion="legs",
         start_m=(20, 15),

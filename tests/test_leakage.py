@@ -6,12 +6,14 @@ import pytest
 from tests.anchors import play_subsets, ring_scenario
 from wsn_env import World
 from wsn_env.physics.motion import predict_moments
-from wsn_env.sections import TRACKERS
+from wsn_env.sections import BOUNDARY_TRACKERS, TRACKERS
 from wsn_env.trackers import make_tracker
 from wsn_env.trackers.fingerprint import _network, _training, trained_network, training_of
 
 CASES = [(name, start) for name in TRACKERS for start in ("known", "fix")]
-OVERRIDES = {}  # name: what a tracker needs beside the anchors' strengths
+OVERRIDES = {  # name: what a tracker needs in place of the anchors' strengths
+    name: dict(measurement="binary", radius_m=80.0) for name in BOUNDARY_TRACKERS
+}
 
 
 def scenario_for(name, **more):

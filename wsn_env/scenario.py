@@ -73,8 +73,11 @@ class Scenario(Section):
     def _check_tracker(self) -> None:
         name, kind = self.tracking.tracker, type(self.measurement)
         if kind not in READS[name]:
-            able = ", ".join(tracker for tracker, kinds in READS.items() if kind in kinds)
-            raise ScenarioError(f"Tracking.tracker = {name!r}: cannot read {kind.__name__} reports: allowed are {able}")
+            able = [measurement for measurement, its_kind in MEASUREMENTS.items() if its_kind in READS[name]]
+            allowed = "allowed are the measurements" if len(able) > 1 else "allowed is the measurement"
+            raise ScenarioError(
+                f"Tracking.tracker = {name!r}: cannot read {kind.__name__} reports; {allowed} {' and '.join(able)}"
+            )
         if name in BOUNDARY_TRACKERS and not name.startswith("centroid") and self.measurement.reports != "changes":
             raise ScenarioError(
                 f"Binary.reports = {self.measurement.reports!r}: allowed is 'changes' with the tracker {name!r}"

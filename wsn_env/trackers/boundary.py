@@ -43,8 +43,8 @@ GATE_SDS = 3.0
 class BoundaryTracker:
     """The trackers of this module, by the scenario's `tracker`. Their memory is the belief's mean and covariance.
 
-    After a search recursive least squares knows nothing, P0 = 1e4 I; in an episode whose start is not known it takes its
-    fix in period 1 for the position, at rest. boundary_ekf goes on from the centroid, P0 = diag(100, 200, 100, 200).
+    After a search recursive least squares knows nothing, P0 = 1e4 I; where an episode's start is not known it takes the
+    fix of period 1 for the position, at rest. boundary_ekf goes on from the centroid, P0 = diag(100, 200, 100, 200).
 
     They suppose that nodes are awake in every period: one that has slept reports a state that it finds changed, though
     the target may have crossed its edge long ago. Where nodes sleep, the particle filter is the better tracker.

@@ -39,7 +39,7 @@ class _CubatureTracker:
 
     def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
         """Predict and correct every row, in place."""
-        rest = self.iterations, belief.row, network.positions, *reports
+        rest = self.iterations, belief.row, network.positions, *reports[:3]
         over_rows(_correct_rows, len(keys), self._threads, self._constants, *rest)
 
 

@@ -1,4 +1,4 @@
-"""What the text of Zhou, Cheng & Xing (2009) leaves open, tried apart from the world on its fields and tracks, in NumPy.
+"""What the text of Zhou, Cheng & Xing (2009) leaves open, tried in NumPy on the fields and tracks of the world.
 
 Which pairs of boundary nodes eqs. 3-8 are written for, which sign the half-period shift has, and what the recursion of
 eqs. 9-13 does as printed.
