@@ -1,4 +1,4 @@
-"""The cluster follows the centroid of the nodes that detected last."""
+"""The cluster follows the centroid of the nodes that detect."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from wsn_env.view import View
 
 @dataclass(frozen=True)
 class Centroid(ViewPolicy):
-    """Head: the living node nearest to the centroid of the nodes that detected last; members: the living nodes within
-    the sensing radius of it. No motion model.
+    """Head: the living node nearest to the centroid of the nodes that detected last (binary sensors: that are known to
+    detect); members: the living nodes within the sensing radius of it. No motion model.
 
-    Without a detection in the last period the cluster stays; with no cluster yet, the estimate stands for the centroid.
+    Without a detection the cluster stays; with no cluster yet, the estimate stands for the centroid.
     """
 
     def act(self, view: View) -> Cluster:
         """Follow, for every row."""
-        count = view.detected.sum(axis=1)
+        count = view.sees.sum(axis=1)
         centre = view.mean[:, ::2].copy()
         for axis in (0, 1):
-            total = np.cumsum(np.where(view.detected, view.positions[:, :, axis], 0.0), axis=1)[:, -1]
+            total = np.cumsum(np.where(view.sees, view.positions[:, :, axis], 0.0), axis=1)[:, -1]
             centre[:, axis] = np.where(count > 0, total / np.maximum(count, 1), centre[:, axis])
         distance = np.where(view.alive, distances_to(view.positions, centre), np.inf)
         stay = (count == 0) & (view.head >= 0)

@@ -1,21 +1,23 @@
-"""The EKF tracker against filterpy's linear filter and a plain extended one, over whole episodes."""
+"""The EKF and the UKF tracker against filterpy's filters and a plain extended one, over whole episodes."""
 
 import math
 
 import numpy as np
 import pytest
-from filterpy.kalman import KalmanFilter
+from filterpy.kalman import KalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
 
+from tests.anchors import play_subsets, ring_scenario, tell
 from wsn_env import Scenario, View, World, make_policy
+from wsn_env.trackers.kalman import constant_velocity, square_root
 
 F = np.array([[1, 1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 1], [0, 0, 0, 1.0]])
 G = np.array([[0.5, 0], [1, 0], [0, 0.5], [0, 1]])
 H = np.eye(4)[::2]
 
 
-def episode(check, **overrides):
+def episode(check, tracker="ekf", **overrides):
     """Plays with nearest3; `check(state)` after every period. Returns the number of reports."""
-    scenario = Scenario.named("PreDC-v0", tracker="ekf", search=False, **overrides)
+    scenario = Scenario.named("PreDC-v0", tracker=tracker, search=False, **overrides)
     world, policy = World(scenario, threads=1), make_policy("nearest3", scenario)
     state = world.reset([4])
     check(state)
@@ -33,7 +35,8 @@ def told(state):
     return zip(state.reports.node[0, :n], state.reports.value[0, :n], strict=True)
 
 
-def test_position_reports_equal_filterpys_linear_filter():
+@pytest.mark.parametrize(("tracker", "within"), [("ekf", 1e-9), ("ukf", 1e-8)])
+def test_position_reports_equal_filterpys_linear_filter(tracker, within):
     oracle = KalmanFilter(dim_x=4, dim_z=2)
     oracle.F, oracle.H, oracle.Q, oracle.R = F, H, 0.05**2 * G @ G.T, 4 * np.eye(2)
 
@@ -44,10 +47,10 @@ def test_position_reports_equal_filterpys_linear_filter():
         oracle.predict()
         for _, value in told(state):
             oracle.update(value)
-        np.testing.assert_allclose(state.belief.mean[0], oracle.x, atol=1e-9)
-        np.testing.assert_allclose(state.belief.cov[0], oracle.P, atol=1e-9)
+        np.testing.assert_allclose(state.belief.mean[0], oracle.x, atol=within)
+        np.testing.assert_allclose(state.belief.cov[0], oracle.P, atol=within)
 
-    assert episode(check) > 100
+    assert episode(check, tracker) > 100
 
 
 @pytest.mark.parametrize("measurement", ["rssi", "rssi_power"])
@@ -79,18 +82,47 @@ def test_strength_reports_equal_a_plain_extended_filter(measurement):
     assert episode(check, measurement=measurement) > 50
 
 
-def test_covariances_are_symmetric_and_positive():
+def test_the_unscented_filter_is_filterpys():
+    """With all reports of a period as one measurement, whichever anchors they come from."""
+    scenario = ring_scenario(tracker="ukf", start_sd_m=10.0, start_sd_ms=3.0)
+    transition, noise = constant_velocity(scenario)
+    points = MerweScaledSigmaPoints(4, 0.1, 2.0, -1.0)
+    oracle = UnscentedKalmanFilter(4, 8, 0.5, None, lambda x, dt: transition @ x, points)
+    oracle.Q = noise
+    for k, state in enumerate(play_subsets(scenario, [5])):
+        if k == 0:
+            oracle.x, oracle.P = state.belief.mean[0].copy(), state.belief.cov[0].copy()
+            continue
+        nodes, values = tell(state)
+        oracle.predict()
+        if len(nodes):
+            hx = lambda x, nodes=nodes: -40 - 15 * np.log10(((x[::2] - nodes) ** 2).sum(axis=1))  # noqa: E731
+            oracle.update(values[:, 0], R=9 * np.eye(len(nodes)), hx=hx)
+        np.testing.assert_allclose(state.belief.mean[0], oracle.x, rtol=1e-8, atol=1e-8)
+        np.testing.assert_allclose(state.belief.cov[0], oracle.P, rtol=1e-8, atol=1e-8)
+
+
+def test_a_root_is_found_where_a_direction_has_no_variance_or_less():
+    cov = np.diag([4.0, 0, -1, 9])
+    cov[0, 3] = cov[3, 0] = 2
+    root = square_root(cov)
+    np.testing.assert_allclose(root.T @ root, np.where(cov == -1, 0, cov), atol=1e-12)
+
+
+@pytest.mark.parametrize("tracker", ["ekf", "ukf"])
+def test_covariances_are_symmetric_and_positive(tracker):
     def check(state):
         cov = state.belief.cov[0]
         np.testing.assert_array_equal(cov, cov.T)
         assert np.linalg.eigvalsh(cov).min() > 0
 
-    episode(check, measurement="rssi")
+    episode(check, tracker, measurement="rssi")
 
 
-def test_rows_do_not_leak_into_each_other():
+@pytest.mark.parametrize("tracker", ["ekf", "ukf"])
+def test_rows_do_not_leak_into_each_other(tracker):
     """The tracker has one filterpy object: a row's belief must not depend on who went before."""
-    scenario = Scenario.named("PreDC-v0", tracker="ekf", periods=15)
+    scenario = Scenario.named("PreDC-v0", tracker=tracker, periods=15)
     world, policy = World(scenario, threads=1), make_policy("nearest3", scenario)
     batch, alone = world.reset([1, 2, 3]), world.reset([3])
     for _ in range(15):

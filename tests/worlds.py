@@ -6,43 +6,56 @@ import numpy as np
 from hypothesis import strategies as st
 
 from wsn_env import Cluster, Scenario, World
+from wsn_env.scenario import READS
+from wsn_env.sections import BOUNDARY_TRACKERS, MEASUREMENTS
 
+TRACKERS = ("particle", "particle", "particle", "ekf", "ukf", "ickf", "snapshot", *BOUNDARY_TRACKERS)
 MOTIONS = ["crossing", "straight", "sine", "circle", "turns", "waypoint"]
 MODEM_J = 5000.0  # a modem's packets cost so many times a radio's
+AT_1M_DB = {"rssi": -40.0, "sonar": 120.0}
 KEYS = st.integers(0, 2**64 - 1)
 
 
 @st.composite
-def scenarios(draw, trackers=("particle", "particle", "ekf", "snapshot"), modem_hops_m=(30.0, 70.0, 250.0), **fixed):
+def scenarios(draw, trackers=TRACKERS, modem_hops_m=(30.0, 70.0, 250.0), **fixed):
     """Small scenarios of every kind: lossy, short of energy, lost from the start, without any noise in the filter.
 
-    A third hear by a threshold, a third have modems, with batteries (given ones, too) MODEM_J times as large.
+    A third have modems, with batteries (given ones, too) MODEM_J times as large.
     """
+    readable = {name: [t for t in trackers if kind in READS[t]] for name, kind in MEASUREMENTS.items()}
+    measurement = fixed.get("measurement", draw(st.sampled_from([name for name in MEASUREMENTS if readable[name]])))
+    tracker = fixed.get("tracker", draw(st.sampled_from(readable[measurement])))
     overrides = dict(
         nodes=draw(st.integers(1, 60)),
         side_m=draw(st.sampled_from([60.0, 100.0, 140.0])),
         periods=draw(st.integers(3, 25)),
         lam=draw(st.sampled_from([4.0, 0, (0.3, 30)])),
         motion=draw(st.sampled_from(MOTIONS)),
+        measurement=measurement,
         packet_success=draw(st.sampled_from([1.0, 0.9, 0.3, 0.0])),
         retries=draw(st.integers(0, 4)),
         battery_j=draw(st.sampled_from([1.0, 1e-3, 2e-4, 5e-5, 1e-6])),
         handover=draw(st.sampled_from(["estimate", "estimate", "particles"])),
-        tracker=draw(st.sampled_from(trackers)),
+        receiver=draw(st.sampled_from(["head", "head", "sink", "target"])),
+        tracker=tracker,
+        gate_m=draw(st.sampled_from([None, None, 2.0, 20.0])),
         particles=draw(st.sampled_from([2, 3, 16, 17, 50, 300])),
         fusion=draw(st.sampled_from(["joint", "pooled"])),
-        silent_information=draw(st.sampled_from([False, False, True])),
         resample_below=draw(st.sampled_from([2 / 3, 2 / 3, 0, 1])),
-        resampling=draw(st.sampled_from(["systematic", "spread"])),
-        spread_scale=draw(st.sampled_from([0.5, 0.0, 3.0])),
-        redraw_on_handover=draw(st.sampled_from([False, False, True])),
         filter_q=draw(st.sampled_from([None, 0, 0.5])),
-        start=draw(st.sampled_from(["known", "known", "search"])),
+        start=draw(st.sampled_from(["known", "known", "search", "field", "fix"])),
         start_sd_m=draw(st.sampled_from([1.0, 1e-6, 12.0])),
         search=draw(st.sampled_from([True, True, False])),
         search_gap=draw(st.integers(1, 6)),
     )
-    overrides |= draw(st.sampled_from([curve_sensing, curve_sensing, threshold_sensing]))(draw)
+    if measurement in AT_1M_DB and "radius_m" not in fixed and draw(st.booleans()):
+        overrides |= draw(threshold(AT_1M_DB[measurement]))
+    else:
+        overrides |= dict(radius_m=draw(st.sampled_from([3.0, 10.0, 40.0])), ceiling=draw(st.sampled_from([0.6, 1.0])))
+    if measurement == "binary":
+        overrides |= draw(binary_sensors(tracker))
+    if tracker == "particle":
+        overrides |= draw(cloud(measurement))
     if draw(st.booleans()):
         overrides |= dict(layout="grid", nodes=isqrt(overrides["nodes"]) ** 2, jitter=draw(st.sampled_from([0.25, 0])))
     overrides |= fixed
@@ -51,28 +64,39 @@ def scenarios(draw, trackers=("particle", "particle", "ekf", "snapshot"), modem_
         overrides["battery_j"] *= MODEM_J
     else:
         overrides["sensing_nj"] = draw(st.sampled_from([0.0, 1500.0]))
-    if overrides["tracker"] != "particle":
-        overrides |= dict(silent_information=False, resampling="systematic", redraw_on_handover=False)
     return Scenario.named("PreDC-v0", **overrides)
 
 
-def curve_sensing(draw):
-    """Detection by eqs. 2-3, with any measurement."""
+@st.composite
+def threshold(draw, at_1m_db):
+    """Detection by a threshold on a level in dB, at a mean level that is reached at 3 to 40 m."""
     return dict(
-        measurement=draw(st.sampled_from(["position", "rssi", "rssi_power", "sonar"])),
-        radius_m=draw(st.sampled_from([3.0, 10.0, 40.0])),
-        ceiling=draw(st.sampled_from([0.6, 1.0])),
+        detection="threshold",
+        threshold_db=at_1m_db - draw(st.sampled_from([7.0, 20.0, 30.0])),
+        noise_db=draw(st.sampled_from([3.0, 0.5])),
     )
 
 
-def threshold_sensing(draw):
-    """Detection by a threshold on a level in dB, at a mean level that is reached at 3 to 40 m."""
-    measurement, at_1m = draw(st.sampled_from([("sonar", 120.0), ("rssi", -40.0)]))
+@st.composite
+def binary_sensors(draw, tracker):
+    """What binary sensors have of their own; those that tell of their presence serve no tracker of the boundary."""
+    modes = ["changes"] if tracker.startswith("boundary") else ["changes", "presence"]
     return dict(
-        measurement=measurement,
-        detection="threshold",
-        threshold_db=at_1m - draw(st.sampled_from([7.0, 20.0, 30.0])),
-        noise_db=draw(st.sampled_from([3.0, 0.5])),
+        reports=draw(st.sampled_from(modes)),
+        refresh=draw(st.sampled_from([0, 0, 1, 3])),
+        flip=draw(st.sampled_from([0.0, 0.01, 0.4])),
+        edge_m=draw(st.sampled_from([1.0, 0.01, 20.0])),
+    )
+
+
+@st.composite
+def cloud(draw, measurement):
+    """What the particle filter alone has; a bitmap tells of silence anyhow."""
+    return dict(
+        silent_information=measurement != "binary" and draw(st.sampled_from([False, False, True])),
+        resampling=draw(st.sampled_from(["systematic", "spread"])),
+        spread_scale=draw(st.sampled_from([0.5, 0.0, 3.0])),
+        redraw_on_handover=draw(st.sampled_from([False, False, True])),
     )
 
 

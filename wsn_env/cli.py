@@ -115,7 +115,7 @@ def run_compile(command: Compile) -> None:
             env = ClusterEnv(particles=20, periods=3, start="search", order=order, fast=fast)
             env.reset(seed=0)
             env.step(10)
-    for tracker in ("particle", "snapshot"):
+    for tracker in ("particle", "snapshot", "ickf"):
         scenario = Scenario.named("PreDC-v0", particles=20, periods=2, tracker=tracker)
         for policy in ("pre_dc", "random"):
             for state, _ in episodes(make_policy(policy, scenario), World(scenario), [0]):

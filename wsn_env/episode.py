@@ -32,7 +32,7 @@ def start_record(scenario: Scenario) -> np.ndarray:
     record = np.zeros(1, START)
     record["known"] = known
     record["sd_m"] = scenario.tracking.start_sd_m if known else scenario.field.side_m / 12**0.5
-    record["sd_ms"] = scenario.tracking.start_sd_ms if known else scenario.tracking.search_sd_ms
+    record["sd_ms"] = scenario.tracking.start_sd_ms if known else scenario.tracking.rest_sd_ms
     record["battery"] = scenario.radio.battery_j
     record["low"], record["high"] = scenario.lam_range
     record["grid"], record["jitter"] = scenario.field.layout == "grid", scenario.field.jitter
@@ -88,7 +88,7 @@ def begin(start, stop, cs, rows, keys, motion, numbers, recordings, starts, plac
 
 @piece
 def _first_belief(stream, truth, s, c, mean, cov):
-    """start="known": mean ~ N(truth, P0), cov = P0; start="search": the whole field, at rest."""
+    """start="known": mean ~ N(truth, P0), cov = P0; the other starts: the whole field, at rest."""
     cov[:] = 0.0
     for axis in range(4):
         cov[axis, axis] = s.sd_m**2 if axis % 2 == 0 else s.sd_ms**2

@@ -6,6 +6,7 @@ from wsn_env import draws
 from wsn_env.compiling import kernel, lean_kernel, lean_piece
 from wsn_env.physics import radio, sensing
 from wsn_env.physics.field import nearest_living, squared_distance
+from wsn_env.physics.motion import predict_moments
 from wsn_env.trackers.kernels import filter_row, redraw_row, scratch
 from wsn_env.types import KEEP_CLUSTER, KEEP_HEAD, Outcome, state_of
 
@@ -163,7 +164,9 @@ def _sense(node, head, purpose, target, state, outcome, b, c):
         return
     squared = squared_distance(positions, node, target[0], target[1])
     value = sensing.tells(key, period, node, squared, c)
-    has_news = _update_state(node, value, purpose, state, b, c) if c.model == sensing.BINARY else value
+    has_news, changed = value, False
+    if c.model == sensing.BINARY:
+        has_news, changed = _update_state(node, value, purpose, state, b, c)
     if not has_news:
         return
     outcome.row[b].detections += 1
@@ -172,7 +175,7 @@ def _sense(node, head, purpose, target, state, outcome, b, c):
         reports.node[b, slot] = node
         if c.model == sensing.BINARY:
             reports.value[b, slot, 0] = value
-            reports.value[b, slot, 1] = 0.0
+            reports.value[b, slot, 1] = changed
             reports.bitmap[b, node] = value
         else:
             sensing.measure(key, period, node, positions, target, c, reports.value[b, slot])
@@ -181,7 +184,8 @@ def _sense(node, head, purpose, target, state, outcome, b, c):
 
 @lean_piece
 def _update_state(node, value, purpose, state, b, c):
-    """A binary sensor compares what it senses with what it sensed last. Returns whether it has to report.
+    """A binary sensor compares what it senses with what it sensed last. Returns whether it has to report, and
+    whether its state has changed.
 
     In a search everybody is asked, and silence means 0; so it does where every presence is reported.
     """
@@ -189,8 +193,8 @@ def _update_state(node, value, purpose, state, b, c):
     state.sensed[b, node] = value
     if c.every_presence or purpose == radio.SEARCH:
         state.reports.bitmap[b, node] = 0
-        return value
-    return changed or (c.refresh > 0 and state.row[b].period % c.refresh == 0)
+        return value, changed
+    return changed or (c.refresh > 0 and state.row[b].period % c.refresh == 0), changed
 
 
 @lean_piece
@@ -374,27 +378,3 @@ def _bury(network, b):
             members[living] = members[k]
             living += 1
     standing.n_members = living
-
-
-@lean_piece
-def predict_moments(mean, cov, t, q, predicted_mean, predicted_cov):
-    """F x and F P F' + q^2 G G' (eq. 16).
-
-    Differs from the paper: as printed, eq. 16 leaves out the spread of the particles, so that E would be constant.
-    """
-    for i in range(4):
-        predicted_mean[i] = mean[i] + (t * mean[i + 1] if i % 2 == 0 else 0.0)
-        for j in range(4):
-            p = cov[i, j]
-            if i % 2 == 0:
-                p += t * cov[i + 1, j]
-            if j % 2 == 0:
-                p += t * cov[i, j + 1]
-                if i % 2 == 0:
-                    p += t * t * cov[i + 1, j + 1]
-            predicted_cov[i, j] = max(p, 0.0) if i == j else p
-    gain = (0.5 * t * t, t)
-    for axis in (0, 2):
-        for i in range(2):
-            for j in range(2):
-                predicted_cov[axis + i, axis + j] += q * q * gain[i] * gain[j]

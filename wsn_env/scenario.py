@@ -10,10 +10,12 @@ import numpy as np
 
 from wsn_env.quantity import NUMBERS, ScenarioError, Section, quantity, suggest
 from wsn_env.sections import (
+    BOUNDARY_TRACKERS,
     DETECTIONS,
     MEASUREMENTS,
     MOTIONS,
     RADIOS,
+    TRACKERS,
     Binary,
     Crossing,
     Cruise,
@@ -26,6 +28,7 @@ from wsn_env.sections import (
     Position,
     Radio,
     Rssi,
+    RssiPower,
     Sonar,
     Threshold,
     Tracking,
@@ -43,6 +46,11 @@ KINDS = {
     "tracking": (Tracking,),
 }
 BY_NAME = {"motion": MOTIONS, "detection": DETECTIONS, "measurement": MEASUREMENTS, "radio": RADIOS}
+
+# Which measurements a tracker can read.
+READS = dict.fromkeys(TRACKERS, (Position, Rssi, RssiPower, Sonar))
+READS |= dict.fromkeys(("trilateration", "nonlinear_ls", "grnn", "grnn_kf"), (Rssi, RssiPower))
+READS |= dict.fromkeys(BOUNDARY_TRACKERS, (Binary,)) | {"particle": tuple(MEASUREMENTS.values())}
 
 
 @dataclass(frozen=True)
@@ -68,6 +76,7 @@ class Scenario(Section):
             value = getattr(self, name)
             if not isinstance(value, kinds):
                 raise ScenarioError(f"Scenario.{name} = {value!r}: must be a {' or '.join(k.__name__ for k in kinds)}")
+        self._check_tracker()
         low, high = self.lam_range
         if not (np.isfinite([low, high]).all() and 0 <= low <= high) or (low == 0) != (high == 0):
             raise ScenarioError(f"Scenario.lam = {self.lam!r}: must be at least 0 m/mJ, or a pair 0 < low <= high")
@@ -77,6 +86,24 @@ class Scenario(Section):
             raise ScenarioError(
                 f"Scenario.period_s = {self.period_s}: must be at least {self.radio.report_s:.3g} s, until a report of"
                 f" {self.radio.report_bits} bits has arrived"
+            )
+
+    def _check_tracker(self) -> None:
+        name, kind = self.tracking.tracker, type(self.measurement)
+        if kind not in READS[name]:
+            able = [measurement for measurement, its_kind in MEASUREMENTS.items() if its_kind in READS[name]]
+            allowed = "allowed are the measurements" if len(able) > 1 else "allowed is the measurement"
+            raise ScenarioError(
+                f"Tracking.tracker = {name!r}: cannot read {kind.__name__} reports; {allowed} {' and '.join(able)}"
+            )
+        if name in BOUNDARY_TRACKERS and not name.startswith("centroid") and self.measurement.reports != "changes":
+            raise ScenarioError(
+                f"Binary.reports = {self.measurement.reports!r}: allowed is 'changes' with the tracker {name!r}"
+            )
+        if self.binary and self.tracking.silent_information:
+            raise ScenarioError(
+                "Tracking.silent_information = True: allowed is False with Binary reports, whose bitmap already tells"
+                " who keeps silent"
             )
 
     @property
@@ -154,17 +181,20 @@ class Scenario(Section):
         for item in fields(self):
             if item.name in changes:
                 whole[item.name] = changes.pop(item.name)
+        known: dict[str, Any] = {}
         for item in fields(self):
             section = whole.get(item.name, getattr(self, item.name))
             if is_dataclass(section):
-                own = {part.name for part in fields(section)} & changes.keys()
-                if own:
-                    whole[item.name] = replace(section, **{key: changes.pop(key) for key in own})
-        scenario = replace(self, **whole)  # once, since sections may only fit together after all changes
+                own = {part.name for part in fields(section)}
+                known |= dict.fromkeys(own)
+                if own & changes.keys():
+                    whole[item.name] = replace(section, **{key: changes.pop(key) for key in own & changes.keys()})
+            else:
+                known[item.name] = None
         if changes:
             name = next(iter(changes))
-            raise ScenarioError(f"scenario has no quantity {name!r}: {suggest(name, scenario.quantities())}")
-        return scenario
+            raise ScenarioError(f"scenario has no quantity {name!r}: {suggest(name, known)}")
+        return replace(self, **whole)  # at once: a tracker and what it reads may change together
 
     def quantities(self) -> dict[str, Any]:
         """Every quantity of every section by name."""
@@ -203,7 +233,7 @@ PRESETS = {
         detection=Detection(radius_m=60.0, softness=1e-6, ceiling=1.0),
         measurement=Binary(),
         radio=Radio(receiver="sink", report_bits=64, invitation_bits=0),
-        tracking=Tracking(filter_q=0.3, start_sd_m=10.0, start_sd_ms=1.0, search_sd_ms=10.0),
+        tracking=Tracking(filter_q=0.3, start_sd_m=10.0, start_sd_ms=1.0, rest_sd_ms=10.0),
     ),
     "Anchors-v0": Scenario(
         name="Anchors-v0",

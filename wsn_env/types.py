@@ -50,7 +50,7 @@ class Reports(NamedTuple):
 
     count: np.ndarray  # (B,)
     node: np.ndarray  # (B, S) int32
-    value: np.ndarray  # (B, S, 2): x, y [m]; or the strength and 0; or the state, 1 or 0, and 0
+    value: np.ndarray  # (B, S, 2): x, y [m]; or the strength and 0; or the state, 1 or 0, and 1 if it has changed
     bitmap: np.ndarray  # (B, S) int8: the state of each binary sensor as last reported; (B, 0) for other sensors
 
 

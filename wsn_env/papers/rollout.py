@@ -46,6 +46,7 @@ class Record:
     energy_mj: np.ndarray  # (R, K)
     report_mj: np.ndarray  # (R, K) the part of the energy that reports took
     heard: np.ndarray  # (R, K) bool: the head had a report
+    detections: np.ndarray  # (R, K) nodes that had something to report
 
     @property
     def offset_m(self) -> np.ndarray:
@@ -104,7 +105,8 @@ def _play_block(world: World, policy, runs: range, tick) -> tuple[np.ndarray, ..
     periods = []
     for _, outcome in episodes(policy, world, [FIRST_SEED + run for run in runs]):
         report_mj = 1e3 * outcome.energy_j[:, REPORT]
-        periods.append((outcome.target_m, outcome.estimate_m, outcome.energy_mj, report_mj, outcome.delivered > 0))
+        heard = outcome.delivered > 0
+        periods.append((outcome.target_m, outcome.estimate_m, outcome.energy_mj, report_mj, heard, outcome.detections))
         tick()
     return tuple(np.stack(arrays, axis=1) for arrays in zip(*periods, strict=True))
 

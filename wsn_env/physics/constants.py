@@ -54,6 +54,7 @@ CONSTANTS = np.dtype(
         ("hop_m", "f8"),
         # tracking
         ("q", "f8"),
+        ("gate_m", "f8"),  # inf: none
         ("pooled", "i8"),
         ("silent_information", "i8"),
         ("resample_below", "f8"),
@@ -90,6 +91,7 @@ def constants(scenario: Scenario) -> np.ndarray:
         asleep_j=r.asleep_j(scenario.period_s),
         hop_m=r.hop_m,
         q=scenario.filter_q,
+        gate_m=math.inf if t.gate_m is None else t.gate_m,
         pooled=t.fusion == "pooled",
         silent_information=t.silent_information,
         resample_below=t.resample_below,

@@ -4,6 +4,7 @@ import numpy as np
 
 from wsn_env import draws
 from wsn_env.compiling import lean_kernel, lean_piece, over_rows, piece
+from wsn_env.sections import Field
 
 
 @piece
@@ -22,6 +23,26 @@ def lay_out(stream, side_m, jitter, positions):
     for i in range(len(positions)):
         positions[i, 0] = cell * (i % across + 0.5 + jitter * (2.0 * draws.uniform(stream, 2 * i) - 1.0))
         positions[i, 1] = cell * (i // across + 0.5 + jitter * (2.0 * draws.uniform(stream, 2 * i + 1) - 1.0))
+
+
+def fixed_positions(field: Field):
+    """Where the nodes stand in every episode alike: (S, 2) m, or None where each episode draws its own."""
+    if field.positions is not None:
+        return np.array(field.positions)
+    if field.field_seed is None:
+        return None
+    positions = np.empty((field.nodes, 2))
+    _place_by_key(draws.key_of_seed(field.field_seed), field.side_m, field.layout == "grid", field.jitter, positions)
+    return positions
+
+
+@lean_kernel
+def _place_by_key(key, side_m, in_grid, jitter, positions):
+    stream = draws.stream(key, 0, draws.FIELD)
+    if in_grid:
+        lay_out(stream, side_m, jitter, positions)
+    else:
+        scatter(stream, side_m, positions)
 
 
 @lean_piece

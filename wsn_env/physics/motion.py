@@ -10,7 +10,7 @@ from dataclasses import fields
 import numpy as np
 
 from wsn_env import draws
-from wsn_env.compiling import piece
+from wsn_env.compiling import lean_piece, piece
 from wsn_env.numerics import HALF_PI, sincos
 from wsn_env.quantity import ScenarioError
 from wsn_env.scenario import Scenario
@@ -118,6 +118,30 @@ def advance(state, period_s, ax, ay, out):
     out[1] = state[1] + period_s * ax
     out[2] = state[2] + period_s * state[3] + half * ay
     out[3] = state[3] + period_s * ay
+
+
+@lean_piece
+def predict_moments(mean, cov, t, q, predicted_mean, predicted_cov):
+    """F x and F P F' + q^2 G G' (eq. 16).
+
+    Differs from the paper: as printed, eq. 16 leaves out the spread of the particles, so that E would be constant.
+    """
+    for i in range(4):
+        predicted_mean[i] = mean[i] + (t * mean[i + 1] if i % 2 == 0 else 0.0)
+        for j in range(4):
+            p = cov[i, j]
+            if i % 2 == 0:
+                p += t * cov[i + 1, j]
+            if j % 2 == 0:
+                p += t * cov[i, j + 1]
+                if i % 2 == 0:
+                    p += t * t * cov[i + 1, j + 1]
+            predicted_cov[i, j] = max(p, 0.0) if i == j else p
+    gain = (0.5 * t * t, t)
+    for axis in (0, 2):
+        for i in range(2):
+            for j in range(2):
+                predicted_cov[axis + i, axis + j] += q * q * gain[i] * gain[j]
 
 
 @piece
@@ -266,7 +290,7 @@ def walk_legs(scenario: Scenario) -> np.ndarray:
     time = scenario.period_s * np.arange(scenario.periods + 1)
     leg = np.searchsorted(ends, time - 1e-9 * scenario.period_s)
     points = corners[leg] + (time - begins[leg])[:, None] * legs[leg, 1:]
-    outside = np.flatnonzero(((points < -1e-9 * side) | (points > (1 + 1e-9) * side)).any(axis=1))
+    outside = np.flatnonzero(~((points >= -1e-9 * side) & (points <= (1 + 1e-9) * side)).all(axis=1))
     if outside.size:
         k = outside[0]
         there = tuple(points[k].tolist())

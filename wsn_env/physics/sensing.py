@@ -10,7 +10,7 @@ from wsn_env.compiling import lean_kernel, lean_piece
 from wsn_env.numerics import exp, log, normal_cdf
 from wsn_env.physics.constants import sensing_constants
 from wsn_env.physics.field import squared_distance
-from wsn_env.sections import Binary, Detection, Measurement, Position, Threshold
+from wsn_env.sections import Binary, Detection, Level, Measurement, Position, Threshold
 
 POSITION, BINARY = Position.code, Binary.code
 
@@ -102,6 +102,43 @@ def strength(squared, c):
     if c.model == 2:
         return c.level * exp(-fall)
     return c.level - fall - (c.absorption * np.sqrt(near) if c.model == 3 else 0.0)
+
+
+def expected_strengths(points, nodes, measurement: Measurement):
+    """Noise-free strengths (eq. 1) of targets at some points, at every node.
+
+    Args:
+        points: (..., 2) m.
+        nodes: (n, 2) m.
+        measurement: of a strength, in dB or in power.
+
+    Returns: (..., n).
+    """
+    offset = np.asarray(points)[..., None, :] - nodes
+    return _strength_law((offset**2).sum(axis=-1), measurement)
+
+
+def strength_slopes(points, nodes, measurement: Measurement):
+    """How the strengths of `expected_strengths` change with x and y [1/m]; 0 nearer than the floor.
+
+    Returns: (..., n, 2).
+    """
+    offset = np.asarray(points)[..., None, :] - nodes
+    squared = (offset**2).sum(axis=-1)
+    if isinstance(measurement, Level):
+        fall = 10 * measurement.exponent / np.log(10) + measurement.absorption_db_per_m * np.sqrt(squared)
+    else:
+        fall = measurement.exponent * _strength_law(squared, measurement)
+    fall = np.where(squared < measurement.floor_m**2, 0.0, fall) / np.maximum(squared, 1e-12)
+    return -fall[..., None] * offset
+
+
+def _strength_law(squared, measurement: Measurement):
+    squared = np.maximum(squared, max(measurement.floor_m**2, 1e-12))
+    if isinstance(measurement, Level):
+        fall = 5 * measurement.exponent * np.log10(squared) + measurement.absorption_db_per_m * np.sqrt(squared)
+        return measurement.at_1m_db - fall
+    return measurement.amplitude * squared ** (-measurement.exponent / 2)
 
 
 @lean_piece

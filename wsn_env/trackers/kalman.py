@@ -1,16 +1,33 @@
-"""The extended Kalman filter, through filterpy: each report corrects in turn (in the order of the nodes)."""
-
-import math
+"""The extended and the unscented Kalman filter, through filterpy."""
 
 import numpy as np
 
+from wsn_env.physics.sensing import expected_strengths, strength_slopes
 from wsn_env.scenario import Scenario
-from wsn_env.sections import Level, Position
+from wsn_env.sections import Level, Measurement, Position
 from wsn_env.types import Belief, Network, Reports
 
 
+def constant_velocity(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
+    """F and Q of the constant velocity model (eqs. 6-8), (4, 4) each: Q = q^2 G G', G = (T^2/2, T) an axis.
+
+    The acceleration is constant within a period and has sd q. White acceleration of density w (m^2/s^3) is, up to
+    w T^3/12 in the variance of the position, q = sqrt(w / T).
+    """
+    t, q = scenario.period_s, scenario.filter_q
+    gain = np.array([[t * t / 2, 0], [t, 0], [0, t * t / 2], [0, t]])
+    return np.array([[1, t, 0, 0], [0, 1, 0, 0], [0, 0, 1, t], [0, 0, 0, 1.0]]), q * q * gain @ gain.T
+
+
+def noise_of(measurement: Measurement) -> float:
+    """Its sd, in its unit."""
+    if isinstance(measurement, Position):
+        return measurement.noise_m
+    return measurement.noise_db if isinstance(measurement, Level) else measurement.noise
+
+
 class EKFTracker:
-    """filterpy's ExtendedKalmanFilter on the constant velocity model (eqs. 6-8).
+    """filterpy's ExtendedKalmanFilter: each report corrects in turn, in the order of the nodes.
 
     A position report is linear, so the filter is then exact; a strength is linearised at the current mean. It keeps
     no memory but the belief, and loops over rows: its speed is filterpy's.
@@ -18,15 +35,12 @@ class EKFTracker:
 
     particles = 0
 
-    def __init__(self, scenario: Scenario):
+    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
         from filterpy.kalman import ExtendedKalmanFilter  # takes a second or two to import
 
-        t, q = scenario.period_s, scenario.filter_q
-        gain = np.array([[t * t / 2, 0], [t, 0], [0, t * t / 2], [0, t]])
-        self._measurement = scenario.measurement
+        self._measurement, self._noise = scenario.measurement, noise_of(scenario.measurement)
         self._filter = ExtendedKalmanFilter(dim_x=4, dim_z=2)
-        self._filter.F = np.array([[1, t, 0, 0], [0, 1, 0, 0], [0, 0, 1, t], [0, 0, 0, 1.0]])
-        self._filter.Q = q * q * gain @ gain.T
+        self._filter.F, self._filter.Q = constant_velocity(scenario)
 
     def start(self, keys, periods, rows, belief: Belief) -> None:
         """Nothing to spread: mean and covariance are the whole belief."""
@@ -45,37 +59,82 @@ class EKFTracker:
             belief.mean[b], belief.cov[b] = ekf.x, 0.5 * (ekf.P + ekf.P.T)
 
     def _update(self, node: np.ndarray, value: np.ndarray) -> None:
-        m = self._measurement
-        if isinstance(m, Position):
+        variance = self._noise**2
+        if isinstance(self._measurement, Position):
             self._filter.update(
-                value, HJacobian=lambda x: POSITION_ROWS, Hx=lambda x: x[[0, 2]], R=m.noise_m**2 * np.eye(2)
+                value, HJacobian=lambda x: POSITION_ROWS, Hx=lambda x: x[[0, 2]], R=variance * np.eye(2)
             )
             return
-        noise = m.noise_db if isinstance(m, Level) else m.noise
         self._filter.update(
             value[:1],
             HJacobian=lambda x: self._strength(x, node)[1],
             Hx=lambda x: self._strength(x, node)[0],
-            R=np.array([[noise**2]]),
+            R=np.array([[variance]]),
         )
 
     def _strength(self, x: np.ndarray, node: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Strength (1,) at a state, and its slope (1, 4); flat nearer than the floor."""
-        m = self._measurement
-        offset = x[[0, 2]] - node
-        squared = max(float(offset @ offset), m.floor_m**2, 1e-12)
-        flat = offset @ offset < m.floor_m**2
-        if isinstance(m, Level):
-            distance, absorption = math.sqrt(squared), m.absorption_db_per_m
-            level = m.at_1m_db - 5 * m.exponent * math.log10(squared) - absorption * distance
-            slope = -10 * m.exponent / math.log(10) / squared - absorption / distance
-        else:
-            level = m.amplitude * squared ** (-m.exponent / 2)
-            slope = -m.exponent * level / squared
+        at = x[[0, 2]], node[None], self._measurement
         row = np.zeros((1, 4))
-        if not flat:
-            row[0, [0, 2]] = slope * offset
-        return np.array([level]), row
+        row[:, [0, 2]] = strength_slopes(*at)
+        return expected_strengths(*at), row
+
+
+class UKFTracker:
+    """filterpy's UnscentedKalmanFilter: 9 points (alpha = .1, beta = 2, kappa = -1), all reports at once.
+
+    Van der Merwe (2004). Keeps no memory but the belief; a covariance that has lost its sign, as the negative weight
+    of the central point allows, gets it back.
+    """
+
+    particles = 0
+
+    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
+        from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
+
+        transition, noise = constant_velocity(scenario)
+        points = MerweScaledSigmaPoints(4, alpha=0.1, beta=2.0, kappa=-1.0, sqrt_method=square_root)
+        self._filter = UnscentedKalmanFilter(
+            dim_x=4, dim_z=1, dt=scenario.period_s, hx=None, fx=lambda x, dt: transition @ x, points=points
+        )
+        self._filter.Q = noise
+        self._measurement, self._noise = scenario.measurement, noise_of(scenario.measurement)
+
+    def start(self, keys, periods, rows, belief: Belief) -> None:
+        """Nothing to spread: mean and covariance are the whole belief."""
+
+    def relocate(self, keys, periods, rows, belief: Belief) -> None:
+        """Nothing to move but mean and covariance."""
+
+    def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
+        """Predict and correct every row, in place."""
+        ukf = self._filter
+        for b in range(len(keys)):
+            ukf.x, ukf.P = belief.mean[b].copy(), belief.cov[b].copy()
+            ukf.predict()
+            n = reports.count[b]
+            if n > 0:
+                self._update(network.positions[b, reports.node[b, :n]], reports.value[b, :n])
+            root = square_root(ukf.P)
+            belief.mean[b], belief.cov[b] = ukf.x, root.T @ root
+
+    def _update(self, nodes: np.ndarray, values: np.ndarray) -> None:
+        m = self._measurement
+        if isinstance(m, Position):
+            told, expect = values.ravel(), lambda x: np.tile(x[[0, 2]], len(nodes))
+        else:
+            told, expect = values[:, 0], lambda x: expected_strengths(x[[0, 2]], nodes, m)
+        self._filter.update(told, R=self._noise**2 * np.eye(len(told)), hx=expect)
+
+
+def square_root(cov: np.ndarray) -> np.ndarray:
+    """U with U' U = cov, for any n; directions of negative variance are flattened."""
+    cov = 0.5 * (cov + cov.T)
+    try:
+        return np.linalg.cholesky(cov).T
+    except np.linalg.LinAlgError:
+        variances, directions = np.linalg.eigh(cov)
+        return np.sqrt(np.maximum(variances, 0.0))[:, None] * directions.T
 
 
 POSITION_ROWS = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0]])

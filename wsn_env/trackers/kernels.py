@@ -191,11 +191,12 @@ def _reach(position, box):
 def weigh_state(x, log_weights, position, detects, c):
     """Add to every particle the log probability of the state of the binary sensor at `position`.
 
-    P(1) = f + (1 - 2 f) / (1 + exp((d - R) / s)), f the probability of a misreading and s the softness of the edge.
+    P(1) = f + (1 - 2 f) / (1 + exp((d - R) / s)), s the softness of the edge and f the probability that the bitmap is
+    wrong: by a misreading, or by a change whose report was lost.
     """
     px, py = x[0], x[2]
     sx, sy = F(position[0]), F(position[1])
-    flip = max(c.flip, 1e-6)  # no state rules a particle out
+    flip = min(max(c.flip, 1.0 - c.delivery, 1e-6), 0.5)  # no state rules a particle out
     least, rest = F(flip), F(1.0 - 2.0 * flip)
     slope = F((-1.0 if detects else 1.0) / c.edge_m)
     radius = F(c.radius_m)

@@ -13,7 +13,7 @@ class SnapshotTracker:
 
     particles = 0
 
-    def __init__(self, scenario: Scenario):
+    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
         m = scenario.measurement
         self._positions_reported = isinstance(m, Position)
         self._variance = m.noise_m**2 if self._positions_reported else scenario.radius_m**2 / 2

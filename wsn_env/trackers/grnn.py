@@ -1,0 +1,70 @@
+"""Trackers on a fingerprint network: its fixes alone, and a Kalman filter on them."""
+
+from wsn_env.scenario import Scenario
+from wsn_env.trackers.fingerprint import trained_network
+from wsn_env.trackers.kalman import POSITION_ROWS, constant_velocity
+from wsn_env.types import Belief, Network, Reports
+
+
+class GRNNTracker:
+    """The network's fix of each period's strengths, without memory.
+
+    Any nodes may have reported: the network compares only what was heard. A period without a report keeps the last
+    estimate, and its variance grows by (rest_sd_ms T)^2.
+    """
+
+    particles = 0
+
+    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
+        self._network = trained_network(scenario)
+        self._growth = (scenario.tracking.rest_sd_ms * scenario.period_s) ** 2
+
+    def start(self, keys, periods, rows, belief: Belief) -> None:
+        """Nothing to spread."""
+
+    def relocate(self, keys, periods, rows, belief: Belief) -> None:
+        """Nothing to move but mean and covariance."""
+
+    def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
+        """Replace the estimate by the fix, in place."""
+        for b in range(len(keys)):
+            n = reports.count[b]
+            belief.mean[b, [1, 3]] = 0.0
+            if n == 0:
+                belief.cov[b, [0, 2], [0, 2]] += self._growth
+                continue
+            fix, cov = self._network.locate(reports.node[b, :n], reports.value[b, :n, 0])
+            belief.mean[b, [0, 2]], belief.cov[b] = fix, 0.0
+            belief.cov[b, ::2, ::2] = cov
+
+
+class GRNNKalmanTracker:
+    """filterpy's KalmanFilter with the network's fixes as measurements of the position, and their spread as noise."""
+
+    particles = 0
+
+    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
+        from filterpy.kalman import KalmanFilter
+
+        self._network = trained_network(scenario)
+        self._filter = KalmanFilter(dim_x=4, dim_z=2)
+        self._filter.F, self._filter.Q = constant_velocity(scenario)
+        self._filter.H = POSITION_ROWS
+
+    def start(self, keys, periods, rows, belief: Belief) -> None:
+        """Nothing to spread: mean and covariance are the whole belief."""
+
+    def relocate(self, keys, periods, rows, belief: Belief) -> None:
+        """Nothing to move but mean and covariance."""
+
+    def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
+        """Predict and correct every row, in place."""
+        kf = self._filter
+        for b in range(len(keys)):
+            kf.x, kf.P = belief.mean[b].copy(), belief.cov[b].copy()
+            kf.predict()
+            n = reports.count[b]
+            if n > 0:
+                fix, cov = self._network.locate(reports.node[b, :n], reports.value[b, :n, 0])
+                kf.update(fix, R=cov)
+            belief.mean[b], belief.cov[b] = kf.x, 0.5 * (kf.P + kf.P.T)

@@ -1,0 +1,148 @@
+"""Where a target is, from one period's strengths alone: linear and nonlinear least squares."""
+
+import numpy as np
+
+from wsn_env.compiling import kernel
+from wsn_env.physics import sensing
+from wsn_env.physics.constants import constants
+from wsn_env.quantity import ScenarioError
+from wsn_env.scenario import Scenario
+from wsn_env.sections import Measurement, Position, Rssi
+from wsn_env.trackers.kalman import noise_of
+from wsn_env.types import Belief, Network, Reports
+
+ON_A_LINE = 1e-6  # nodes whose squared extents differ by more than this factor fix no point
+NEWTON_STEPS, NEWTON_END_M = 15, 1e-3
+RIDGE = 1e-6  # 1/m^2: information that keeps the step finite where the likelihood is flat
+
+
+class TrilaterationTracker:
+    """Memoryless linear least squares (`trilaterate`). Needs three nodes that do not stand on one line.
+
+    With fewer the last estimate stays, and its variance grows by (rest_sd_ms T)^2.
+    """
+
+    particles = 0
+
+    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
+        if isinstance(scenario.measurement, Position):
+            raise ScenarioError(
+                f"Tracking.tracker = {scenario.tracking.tracker!r}: needs strengths; allowed are the measurements"
+                " rssi and rssi_power"
+            )
+        self._measurement, self._noise = scenario.measurement, noise_of(scenario.measurement)
+        self._constants, self._side_m = constants(scenario), scenario.field.side_m
+        self._growth = (scenario.tracking.rest_sd_ms * scenario.period_s) ** 2
+
+    def start(self, keys, periods, rows, belief: Belief) -> None:
+        """Nothing to spread."""
+
+    def relocate(self, keys, periods, rows, belief: Belief) -> None:
+        """Nothing to move but mean and covariance."""
+
+    def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
+        """Replace the estimate by the period's, in place."""
+        for b in range(len(keys)):
+            n = reports.count[b]
+            nodes = network.positions[b, reports.node[b, :n]]
+            found = self._locate(nodes, reports.value[b, :n, 0])
+            belief.mean[b, [1, 3]] = 0.0
+            if found is None:
+                belief.cov[b, [0, 2], [0, 2]] += self._growth
+            else:
+                belief.mean[b, [0, 2]], belief.cov[b] = found[0], 0.0
+                belief.cov[b, ::2, ::2] = found[1]
+
+    def _locate(self, nodes, strengths):
+        squared, sd = squared_ranges(strengths, self._measurement, self._noise, 10 * self._side_m)
+        return trilaterate(nodes, squared, sd)
+
+
+class NonlinearLSTracker(TrilaterationTracker):
+    """Memoryless maximum likelihood: Gauss and Newton's iteration on the strengths, from the linear solution.
+
+    The estimate stays within a tenth of the side about the field, and so does each step's length.
+    """
+
+    def _locate(self, nodes, strengths):
+        rough = super()._locate(nodes, strengths)
+        if rough is None:
+            return None
+        point, cov = np.clip(rough[0], 0.0, self._side_m), np.empty((2, 2))
+        _fit_point(self._constants, nodes, np.ascontiguousarray(strengths), point, cov)
+        return point, cov
+
+
+@kernel
+def _fit_point(cs, nodes, strengths, point, cov):
+    """Gauss and Newton's iteration from `point` (2,), in place; `cov` (2, 2) is filled with the inverse information."""
+    c = cs[0]
+    margin = 0.1 * c.side_m
+    for _ in range(NEWTON_STEPS):
+        a, b, d, u, v = RIDGE, 0.0, RIDGE, 0.0, 0.0  # the normal equations (a b; b d) step = (u, v)
+        for i in range(len(strengths)):
+            dx, dy = point[0] - nodes[i, 0], point[1] - nodes[i, 1]
+            squared = dx * dx + dy * dy
+            level = sensing.strength(squared, c)
+            beyond = (strengths[i] - level) / c.noise
+            slope = 0.0
+            if squared > max(c.floor_m * c.floor_m, 1e-12):
+                slope = -2.0 * c.slope / (squared * c.noise) * (1.0 if c.model == 1 else level)
+            a += slope * slope * dx * dx
+            b += slope * slope * dx * dy
+            d += slope * slope * dy * dy
+            u += slope * dx * beyond
+            v += slope * dy * beyond
+        determinant = max(a * d - b * b, RIDGE * RIDGE)
+        cov[0, 0], cov[1, 1] = d / determinant, a / determinant
+        cov[0, 1] = cov[1, 0] = -b / determinant
+        x, y = (d * u - b * v) / determinant, (a * v - b * u) / determinant
+        length = np.sqrt(x * x + y * y)
+        share = margin / max(length, margin)
+        point[0] = min(max(point[0] + share * x, -margin), c.side_m + margin)
+        point[1] = min(max(point[1] + share * y, -margin), c.side_m + margin)
+        if length < NEWTON_END_M:
+            break
+
+
+def squared_ranges(strengths, measurement: Measurement, noise: float, most_m: float):
+    """Squared distances that strengths (n,) speak of, by eq. 1 turned round, and their sds to first order [m^2].
+
+    Args:
+        noise: sd of a strength.
+        most_m: a weaker strength, and a power that noise has made negative, is taken to come from this far.
+    """
+    if isinstance(measurement, Rssi):
+        squared = 10 ** ((measurement.reference_dbm - strengths) / (5 * measurement.exponent))
+        relative = noise * np.log(10) / (5 * measurement.exponent)
+    else:
+        power = np.maximum(strengths, measurement.amplitude * most_m**-measurement.exponent)
+        squared = (measurement.amplitude / power) ** (2 / measurement.exponent)
+        relative = 2 * noise / (measurement.exponent * power)
+    squared = np.minimum(squared, most_m**2)
+    return squared, squared * relative
+
+
+def trilaterate(nodes, squared, sd):
+    """Linear least squares from squared ranges d_i^2 to nodes p_i.
+
+    The first node's circle is taken from the others', which leaves 2 (p_i - p_1)' x = d_1^2 - d_i^2 + |p_i|^2 - |p_1|^2
+    (Lan, Nie et al., eq. 9).
+
+    Args:
+        nodes: (n, 2) m.
+        squared, sd: (n,) d_i^2 and their sds [m^2].
+
+    Returns: the point (2,) and its covariance (2, 2); None from fewer than three nodes, or where all stand on a line.
+    """
+    if len(nodes) < 3:
+        return None
+    design = 2 * (nodes[1:] - nodes[0])
+    normal = design.T @ design
+    if np.linalg.det(normal) <= ON_A_LINE * np.trace(normal) ** 2:
+        return None
+    power = (nodes**2).sum(axis=1)
+    gain = np.linalg.solve(normal, design.T)
+    point = gain @ (squared[0] - squared[1:] + power[1:] - power[0])
+    common = gain.sum(axis=1)  # the first range enters every equation
+    return point, (gain * sd[1:] ** 2) @ gain.T + sd[0] ** 2 * np.outer(common, common)
