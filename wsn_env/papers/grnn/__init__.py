@@ -13,7 +13,8 @@ position); a map of 441 points, 10 m apart, each the mean of 10 samples, and 400
 A filter begins with the network's fix of its first period, at rest with a sd of 10 m/s.
 
 **The combination** is GRNN + KF: the network's fixes are positions, and for these a cubature filter, iterated or not,
-is the Kalman filter. As noise it takes the spread of the fix on the map.
+is the Kalman filter. As noise it takes the spread of the fix on the map. Against the filters on the strengths
+themselves it gains where the period is long and each period's belief is wide; where it is short they are as good.
 **ICKF** is iterated posterior linearisation, which always corrects the prior. To correct the posterior again with the
 same strengths, as some do, counts them several times.
 **Sampling period.** Every sample has its own noise, so that a shorter period brings more information. At an equal rate

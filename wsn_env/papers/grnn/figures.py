@@ -79,7 +79,8 @@ def draw_start(sheet: Sheet):
         look = LOOKS[method] | dict(linestyle="-" if anchors == "ring8" else "--")
         axes.plot(time, values, label=f"{METHODS[method]}, {anchors}", **look)
     axes.set_yscale("log")
-    axes.yaxis.set_major_formatter("{x:g}")
+    axes.set_yticks((1, 2, 5, 10, 20, 50), ["1", "2", "5", "10", "20", "50"])
+    axes.minorticks_off()
     axes.legend(frameon=False, ncols=2)
     return figure
 

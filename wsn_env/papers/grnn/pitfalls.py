@@ -37,20 +37,15 @@ def pitfalls(runs: int) -> Sheet:
         return np.reshape(located, (runs, len(points), 2))
 
     same = fixes(honest, truth)
-    reset = _reset(same, states, scenario)
-    return Sheet(
-        ("evaluation", "rmse_m"),
-        [
-            ("network trained on a grid", _rms(same - truth)),
-            (
-                "the same, then a filter set back to the truth in every period",
-                _rms(_reset(same, states, scenario) - truth),
-            ),
-            ("network trained on the test path", _rms(fixes(cheat, truth) - truth)),
-            ("the same on the mirrored path", _rms(fixes(cheat, mirrored) - mirrored)),
-            ("network trained on a grid, on the mirrored path", _rms(fixes(honest, mirrored) - mirrored)),
-        ],
-    )
+    cases = {
+        "network trained on a grid": same - truth,
+        "the same, then a filter set back to the truth in every period": _reset(same, states, scenario) - truth,
+        "network trained on the test path": fixes(cheat, truth) - truth,
+        "the same on the mirrored path": fixes(cheat, mirrored) - mirrored,
+        "network trained on a grid, on the mirrored path": fixes(honest, mirrored) - mirrored,
+    }
+    rows = [(name, float(np.sqrt((offset**2).sum(axis=-1).mean()))) for name, offset in cases.items()]
+    return Sheet(("evaluation", "rmse_m"), rows)
 
 
 def _reset(fixes, states, scenario):
@@ -60,7 +55,3 @@ def _reset(fixes, states, scenario):
     gain = cov @ np.linalg.inv(cov + np.cov((fixes - states[1:, ::2]).reshape(-1, 2).T))
     predicted = (states[:-1] @ transition.T)[:, ::2]
     return predicted + (fixes - predicted) @ gain.T
-
-
-def _rms(offset) -> float:
-    return float(np.sqrt((offset**2).sum(axis=-1).mean()))
