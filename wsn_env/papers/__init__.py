@@ -8,7 +8,7 @@ from pathlib import Path
 from wsn_env.progress import Progress
 from wsn_env.quantity import suggest
 
-PAPERS = {"pre_dc": "wsn_env.papers.pre_dc", "binary": "wsn_env.papers.binary"}
+PAPERS = {name: f"wsn_env.papers.{name}" for name in ("pre_dc", "binary", "grnn")}
 
 
 def reproduce(name: str, out: str | Path, runs: int = 100, progress: Progress | None = None) -> None:
