@@ -97,7 +97,7 @@ def test_without_a_fix_the_last_one_stays_and_widens(tracker):
 
 @pytest.mark.parametrize("tracker", ["trilateration", "nonlinear_ls"])
 def test_positions_are_refused(tracker):
-    with pytest.raises(ScenarioError, match=f"Tracking.tracker = '{tracker}': needs strengths"):
+    with pytest.raises(ScenarioError, match=f"Tracking.tracker = '{tracker}': cannot read Position"):
         World(Scenario.named("PreDC-v0", tracker=tracker))
 
 

@@ -108,6 +108,23 @@ def write_picture(path: Path, figure) -> None:
         figure.savefig(temporary, format="png", dpi=150)
 
 
+def new_axes(title: str, x: str, y: str):
+    """A matplotlib figure with one pair of axes."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.0, 4.2), layout="constrained")
+    axes = figure.subplots()
+    axes.set(title=title, xlabel=x, ylabel=y)
+    tidy(axes)
+    return figure, axes
+
+
+def tidy(axes) -> None:
+    """No frame, a faint grid."""
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(alpha=0.25)
+
+
 def _cell(value) -> str:
     if isinstance(value, (str, bool, int)):
         return str(value)

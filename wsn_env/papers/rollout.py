@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 from math import ceil
 
 import numpy as np
@@ -20,6 +21,7 @@ from wsn_env.types import PURPOSES
 from wsn_env.world import World
 
 REPORT = PURPOSES.index("report")
+SIGNIFICANT = 2.0  # standard errors
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,12 @@ class Record:
     def axis_rms_m(self, axis: int) -> np.ndarray:
         """(R,) the same along x (0) or y (1) alone."""
         return np.sqrt((self.offset_m[:, :, axis] ** 2).mean(axis=1))
+
+    def pooled_rms_m(self, axis: int | None = None) -> tuple[float, float]:
+        """Root of the mean square error over all runs and periods, along an axis or both, and its standard error."""
+        square = (self.offset_m**2).sum(axis=2) if axis is None else self.offset_m[:, :, axis] ** 2
+        rms = float(np.sqrt(square.mean()))
+        return rms, standard_error(square.mean(axis=1)) / (2 * rms)
 
     def rms_per_period_m(self, heard_only: bool = False) -> np.ndarray:
         """(K,) root of the mean square error over the runs; NaN where no run counts."""
@@ -114,3 +122,17 @@ def _play_block(world: World, policy, runs: range, tick) -> tuple[np.ndarray, ..
 def standard_error(values: np.ndarray) -> float:
     """Of the mean over runs."""
     return float(np.std(values, ddof=1) / np.sqrt(len(values)))
+
+
+def exceeds(larger: np.ndarray, smaller: np.ndarray) -> bool:
+    """Whether one system's error is larger than another's beyond doubt: paired where the runs are the same."""
+    if len(larger) == len(smaller):
+        return bool((larger - smaller).mean() > SIGNIFICANT * standard_error(larger - smaller))
+    doubt = np.hypot(standard_error(larger), standard_error(smaller))
+    return bool(larger.mean() - smaller.mean() > SIGNIFICANT * doubt)
+
+
+def keeps_falling(errors: list[np.ndarray]) -> bool:
+    """Lower at the end than at the start, and on the way never higher than before, beyond doubt."""
+    rises = any(exceeds(after, before) for before, after in pairwise(errors))
+    return exceeds(errors[0], errors[-1]) and not rises

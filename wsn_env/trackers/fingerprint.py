@@ -15,7 +15,7 @@ from wsn_env.physics.field import fixed_positions
 from wsn_env.physics.sensing import expected_strengths
 from wsn_env.quantity import ScenarioError
 from wsn_env.scenario import Scenario
-from wsn_env.sections import Field, Measurement, Position, Rssi
+from wsn_env.sections import Field, Measurement, Rssi
 from wsn_env.trackers.kalman import noise_of
 from wsn_env.trackers.width import fruit_flies, golden_section
 
@@ -141,7 +141,7 @@ def trained_network(scenario: Scenario) -> FingerprintNetwork:
     """The network of a scenario; trained once in a process for equal fields, measurements and seeds.
 
     Raises:
-        ScenarioError: nodes measure no strengths, stand elsewhere in every episode, or leave the field unheard.
+        ScenarioError: nodes stand elsewhere in every episode, or leave the field unheard.
     """
     training = training_of(scenario)
     return _network(training, scenario.tracking.width_search)
@@ -150,8 +150,6 @@ def trained_network(scenario: Scenario) -> FingerprintNetwork:
 def training_of(scenario: Scenario) -> Training:
     """What the network of a scenario is trained on; raises as `trained_network` does."""
     name = f"Tracking.tracker = {scenario.tracking.tracker!r}"
-    if isinstance(scenario.measurement, Position):
-        raise ScenarioError(f"{name}: needs strengths; allowed are the measurements rssi and rssi_power")
     if fixed_positions(scenario.field) is None:
         raise ScenarioError(
             f"{name}: a fingerprint map needs nodes that stand in the same places in every episode;"

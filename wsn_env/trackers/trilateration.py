@@ -5,9 +5,8 @@ import numpy as np
 from wsn_env.compiling import kernel
 from wsn_env.physics import sensing
 from wsn_env.physics.constants import constants
-from wsn_env.quantity import ScenarioError
 from wsn_env.scenario import Scenario
-from wsn_env.sections import Measurement, Position, Rssi
+from wsn_env.sections import Measurement, Rssi
 from wsn_env.trackers.kalman import noise_of
 from wsn_env.types import Belief, Network, Reports
 
@@ -25,11 +24,6 @@ class TrilaterationTracker:
     particles = 0
 
     def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
-        if isinstance(scenario.measurement, Position):
-            raise ScenarioError(
-                f"Tracking.tracker = {scenario.tracking.tracker!r}: needs strengths; allowed are the measurements"
-                " rssi and rssi_power"
-            )
         self._measurement, self._noise = scenario.measurement, noise_of(scenario.measurement)
         self._constants, self._side_m = constants(scenario), scenario.field.side_m
         self._growth = (scenario.tracking.rest_sd_ms * scenario.period_s) ** 2

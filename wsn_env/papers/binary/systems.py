@@ -46,7 +46,7 @@ SYSTEMS = {
     "centroid_rls": System("centroid_rls", reports="presence"),
 }
 SWEPT = ("raw", "paper", "mid", "ekf", "centroid")
-FAULTED = ("raw", "paper_inside", "mid", "ekf", "particle", "centroid")
+FAULTED = ("raw", "paper", "paper_inside", "mid", "ekf", "particle", "centroid")
 
 
 @dataclass(frozen=True)

@@ -7,17 +7,15 @@ the same runs.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
 
 import numpy as np
 
 from wsn_env.papers.pre_dc.systems import MOTIONS, NODES, PARTICLES, Results
 from wsn_env.papers.report import Claim, Expectation, verdict
-from wsn_env.papers.rollout import Record, standard_error
+from wsn_env.papers.rollout import Record, exceeds, keeps_falling
 from wsn_env.physics.sensing import detection_probability, joint_detection_probability
 from wsn_env.sections import Detection
 
-SIGNIFICANT = 2.0  # standard errors
 STABLE = 1.25  # the error is stable while no later quarter of a run exceeds the first by this factor
 FLAT = 0.03  # an error that more particles change by less than this share is flat
 CLEARLY = 0.8  # an energy below this share of another is clearly below it
@@ -75,14 +73,6 @@ def claims(results: Results) -> list[Claim]:
     ]
 
 
-def exceeds(larger: np.ndarray, smaller: np.ndarray) -> bool:
-    """Whether one system's error is larger than another's beyond doubt: paired where the runs are the same."""
-    if len(larger) == len(smaller):
-        return bool((larger - smaller).mean() > SIGNIFICANT * standard_error(larger - smaller))
-    doubt = np.hypot(standard_error(larger), standard_error(smaller))
-    return bool(larger.mean() - smaller.mean() > SIGNIFICANT * doubt)
-
-
 def _errors(results: Results, nodes: int) -> tuple[list[np.ndarray], list[np.ndarray], str, str]:
     """RMS of static, EKF, Pre-DC at a node count: with their own trackers, with one tracker, and both as text."""
     own = [results.system_rms_m(name, nodes) for name in _PAPER]
@@ -113,18 +103,12 @@ def _more_nodes_help(results: Results) -> Iterator[Claim]:
     for name, policy in (("static", "static_cluster"), ("ekf", "nearest1"), ("pre_dc", "pre_dc")):
         own = [results.system_rms_m(name, nodes) for nodes in NODES]
         common = [results.same_tracker(policy, nodes).rms_m() for nodes in NODES]
-        falls = [_falls(errors) for errors in (own, common)]
+        falls = [keeps_falling(errors) for errors in (own, common)]
         paper = " > ".join(f"{PAPER_RMS_M[name, nodes]:.3f}" for nodes in NODES) + " m"
         ours = ", ".join(f"{rms.mean():.3f}" for rms in own) + " m; with one tracker "
         ours += ", ".join(f"{rms.mean():.3f}" for rms in common) + " m"
         what = f"Table 2: the error of {name} falls as nodes are added (81, 121, 169, 225)"
         yield Claim(what, paper, ours, verdict(all(falls), falls[0]))
-
-
-def _falls(errors: list[np.ndarray]) -> bool:
-    """Lower at the end than at the start, and on the way never higher than before, beyond doubt."""
-    rises = any(exceeds(after, before) for before, after in pairwise(errors))
-    return exceeds(errors[0], errors[-1]) and not rises
 
 
 def _energy(results: Results) -> Claim:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from wsn_env.papers.pre_dc.systems import MOTIONS, PARTICLES, SYSTEMS, Results
-from wsn_env.papers.report import Sheet, write_picture, write_sheet
+from wsn_env.papers.report import Sheet, new_axes, tidy, write_picture, write_sheet
 from wsn_env.papers.rollout import standard_error
 from wsn_env.physics.sensing import detection_probability
 from wsn_env.sections import Detection
@@ -113,7 +113,7 @@ def _by_period(names, columns) -> Sheet:
 def draw_detection(sheet: Sheet, detection: Detection):
     """Fig. 1."""
     title = "Fig. 1 (our reading): probability of detection, eqs. 2-3"
-    figure, axes = _axes(title, "distance d to the target [m]", "p(d)")
+    figure, axes = new_axes(title, "distance d to the target [m]", "p(d)")
     distance, p = map(np.array, zip(*sheet.rows, strict=True))
     axes.plot(distance, p, color=PRE_DC)
     inner = (1 - detection.softness) * detection.radius_m
@@ -127,14 +127,16 @@ def draw_detection(sheet: Sheet, detection: Detection):
 
 def draw_error(sheet: Sheet):
     """Fig. 3."""
-    figure, axes = _axes("Fig. 3: error of the three systems, 225 nodes", "time [s]", "RMS error over the runs [m]")
+    figure, axes = new_axes("Fig. 3: error of the three systems, 225 nodes", "time [s]", "RMS error over the runs [m]")
     _lines(axes, sheet, LOOKS)
     return figure
 
 
 def draw_energy(sheet: Sheet):
     """Fig. 4."""
-    figure, axes = _axes("Fig. 4: energy of the three systems, 225 nodes", "time [s]", "mean energy of a period [mJ]")
+    figure, axes = new_axes(
+        "Fig. 4: energy of the three systems, 225 nodes", "time [s]", "mean energy of a period [mJ]"
+    )
     looks = {
         "static": ("static-cluster, reports only", LOOKS["static"][1]),
         "ekf": LOOKS["ekf"],
@@ -156,7 +158,7 @@ def draw_tracks(results: Results):
         axes.plot(*record.estimate_m[0].T, color=EKF, linewidth=1.1, marker=".", markersize=3.5, label="estimate")
         axes.set(title=TRACKS[motion][0], xlim=(0, 100), ylim=(0, 100), aspect="equal")
         axes.label_outer()
-        _tidy(axes)
+        tidy(axes)
     for axes in figure.axes:
         axes.set_xlabel("x [m]" if axes in figure.axes[2:] else "")
         axes.set_ylabel("y [m]" if axes in figure.axes[::2] else "")
@@ -167,7 +169,9 @@ def draw_tracks(results: Results):
 
 def draw_error_on_tracks(sheet: Sheet):
     """Fig. 6."""
-    figure, axes = _axes("Fig. 6: error of Pre-DC on four tracks, 225 nodes", "time [s]", "RMS error over the runs [m]")
+    figure, axes = new_axes(
+        "Fig. 6: error of Pre-DC on four tracks, 225 nodes", "time [s]", "RMS error over the runs [m]"
+    )
     _lines(axes, sheet, TRACKS)
     return figure
 
@@ -175,7 +179,7 @@ def draw_error_on_tracks(sheet: Sheet):
 def draw_particles(sheet: Sheet, name: str, number: int):
     """Figs. 7-8, with two standard errors on either side."""
     title = f"Fig. {number}: error of Pre-DC in {name}, 225 nodes (bars: two standard errors)"
-    figure, axes = _axes(title, "number of particles", f"RMS error in {name} [m]")
+    figure, axes = new_axes(title, "number of particles", f"RMS error in {name} [m]")
     count, rms, error, _ = map(np.array, zip(*sheet.rows, strict=True))
     axes.errorbar(count, rms, yerr=2 * error, color=PRE_DC, marker="o", markersize=4, capsize=3, linewidth=1.4)
     axes.set_xscale("log")
@@ -183,21 +187,6 @@ def draw_particles(sheet: Sheet, name: str, number: int):
     axes.set_ylim(bottom=0)
     axes.annotate(f"{rms[-1]:.2f} m", (count[-1], rms[-1]), xytext=(0, 10), textcoords="offset points", ha="center")
     return figure
-
-
-def _axes(title: str, x: str, y: str):
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.0, 4.2), layout="constrained")
-    axes = figure.subplots()
-    axes.set(title=title, xlabel=x, ylabel=y)
-    _tidy(axes)
-    return figure, axes
-
-
-def _tidy(axes) -> None:
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(alpha=0.25)
 
 
 def _lines(axes, sheet: Sheet, looks: dict) -> None:
