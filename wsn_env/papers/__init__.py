@@ -8,14 +8,17 @@ from pathlib import Path
 from wsn_env.progress import Progress
 from wsn_env.quantity import suggest
 
-PAPERS = {"pre_dc": "wsn_env.papers.pre_dc"}
+PAPERS = {
+    "pre_dc": "wsn_env.papers.pre_dc",
+    "underwater": "wsn_env.papers.underwater",
+}
 
 
 def reproduce(name: str, out: str | Path, runs: int = 100, progress: Progress | None = None) -> None:
     """Rebuild a paper's tables, figures and claims, write them to a folder and print the tables and verdicts.
 
     Args:
-        name: "pre_dc".
+        name: one of PAPERS.
         out: folder for the files, made if it does not exist.
         runs: Monte Carlo runs for each cell; at least 2, for standard errors.
         progress: called as progress(done, total, what) after every simulated period; None: a bar on the terminal.

@@ -20,6 +20,7 @@ from wsn_env.types import PURPOSES
 from wsn_env.world import World
 
 REPORT = PURPOSES.index("report")
+SIGNIFICANT = 2.0  # standard errors
 
 
 @dataclass(frozen=True)
@@ -44,8 +45,19 @@ class Record:
     target_m: np.ndarray  # (R, K, 2)
     estimate_m: np.ndarray  # (R, K, 2) after the period's correction
     energy_mj: np.ndarray  # (R, K)
-    report_mj: np.ndarray  # (R, K) the part of the energy that reports took
-    heard: np.ndarray  # (R, K) bool: the head had a report
+    purposes_mj: np.ndarray  # (R, K, 6) the same by PURPOSES
+    delivered: np.ndarray  # (R, K) reports that the head had
+    handover: np.ndarray  # (R, K) bool
+
+    @property
+    def report_mj(self) -> np.ndarray:
+        """(R, K) the part of the energy that reports took."""
+        return self.purposes_mj[:, :, REPORT]
+
+    @property
+    def heard(self) -> np.ndarray:
+        """(R, K) bool: the head had a report."""
+        return self.delivered > 0
 
     @property
     def offset_m(self) -> np.ndarray:
@@ -103,8 +115,8 @@ def play_all(trials: Iterable[Trial], progress: Progress) -> dict[Trial, Record]
 def _play_block(world: World, policy, runs: range, tick) -> tuple[np.ndarray, ...]:
     periods = []
     for _, outcome in episodes(policy, world, [FIRST_SEED + run for run in runs]):
-        report_mj = 1e3 * outcome.energy_j[:, REPORT]
-        periods.append((outcome.target_m, outcome.estimate_m, outcome.energy_mj, report_mj, outcome.delivered > 0))
+        energy = outcome.energy_mj, 1e3 * outcome.energy_j
+        periods.append((outcome.target_m, outcome.estimate_m, *energy, outcome.delivered, outcome.handover))
         tick()
     return tuple(np.stack(arrays, axis=1) for arrays in zip(*periods, strict=True))
 
@@ -112,3 +124,11 @@ def _play_block(world: World, policy, runs: range, tick) -> tuple[np.ndarray, ..
 def standard_error(values: np.ndarray) -> float:
     """Of the mean over runs."""
     return float(np.std(values, ddof=1) / np.sqrt(len(values)))
+
+
+def exceeds(larger: np.ndarray, smaller: np.ndarray) -> bool:
+    """Whether one system's error is larger than another's beyond doubt: paired where the runs are the same."""
+    if len(larger) == len(smaller):
+        return bool((larger - smaller).mean() > SIGNIFICANT * standard_error(larger - smaller))
+    doubt = np.hypot(standard_error(larger), standard_error(smaller))
+    return bool(larger.mean() - smaller.mean() > SIGNIFICANT * doubt)

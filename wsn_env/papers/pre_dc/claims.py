@@ -13,11 +13,10 @@ import numpy as np
 
 from wsn_env.papers.pre_dc.systems import MOTIONS, NODES, PARTICLES, Results
 from wsn_env.papers.report import Claim, Expectation, verdict
-from wsn_env.papers.rollout import Record, standard_error
+from wsn_env.papers.rollout import Record, exceeds
 from wsn_env.physics.sensing import detection_probability, joint_detection_probability
 from wsn_env.sections import Detection
 
-SIGNIFICANT = 2.0  # standard errors
 STABLE = 1.25  # the error is stable while no later quarter of a run exceeds the first by this factor
 FLAT = 0.03  # an error that more particles change by less than this share is flat
 CLEARLY = 0.8  # an energy below this share of another is clearly below it
@@ -73,14 +72,6 @@ def claims(results: Results) -> list[Claim]:
         *_stability(results),
         *_particles(results),
     ]
-
-
-def exceeds(larger: np.ndarray, smaller: np.ndarray) -> bool:
-    """Whether one system's error is larger than another's beyond doubt: paired where the runs are the same."""
-    if len(larger) == len(smaller):
-        return bool((larger - smaller).mean() > SIGNIFICANT * standard_error(larger - smaller))
-    doubt = np.hypot(standard_error(larger), standard_error(smaller))
-    return bool(larger.mean() - smaller.mean() > SIGNIFICANT * doubt)
 
 
 def _errors(results: Results, nodes: int) -> tuple[list[np.ndarray], list[np.ndarray], str, str]:
