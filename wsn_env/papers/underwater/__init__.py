@@ -2,7 +2,7 @@
 
 The node with the strongest signal is head, every node within one hop of it is a member, a member reports only above a
 threshold, the head hands mean and covariance to the next one, and the particle filter sets further copies of a particle
-about it instead of on it. The patent gives no figures; what is expected here are those of an independent implementation.
+about it instead of on it. The patent gives no figures; what is expected here is an independent implementation's.
 
 Our reading, in two dimensions (depth comes from a pressure gauge): Underwater-v0's field of 1 km x 1 km, 64 nodes, one
 hop of 250 m, periods of 5 s, levels with 3 dB of noise, a threshold of 85 dB. The target cruises from about 2 m/s, with

@@ -114,3 +114,10 @@ def rmse_m(record: Record) -> tuple[float, float]:
     square = record.square_error().mean(axis=1)
     rmse = sqrt(square.mean())
     return rmse, float(np.std(square, ddof=1) / sqrt(len(square)) / (2 * rmse))
+
+
+def median_rms_m(record: Record) -> tuple[float, float]:
+    """Median of the runs' RMS, and its standard error (bootstrap)."""
+    rms = record.rms_m()
+    picks = np.random.default_rng(0).integers(len(rms), size=(1000, len(rms)))
+    return float(np.median(rms)), float(np.median(rms[picks], axis=1).std(ddof=1))
