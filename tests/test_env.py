@@ -33,7 +33,7 @@ def same(a, b) -> bool:
     return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
 
 
-@pytest.mark.parametrize("scenario", ("PreDC-v0", "Rssi-v0"))
+@pytest.mark.parametrize("scenario", ("PreDC-v0", "Rssi-v0", "Underwater-v0"))
 @pytest.mark.parametrize("reward", ("error", "belief"))
 @pytest.mark.parametrize("action,observation", list(itertools.product(ACTIONS, OBSERVATIONS)))
 def test_check_env_passes_without_a_warning(scenario, action, observation, reward):

@@ -142,7 +142,7 @@ class Cruise(Motion):
     variance D T^3 / 12 then, which is negligible beside any measurement here.
     """
 
-    fitting_q: ClassVar[float] = 0.015
+    fitting_q: ClassVar[float] = 0.01
     speed_ms: float = quantity(1.0, "speed at the start", above=0)
     acceleration_ms2: float = quantity(0.01, "sd of the white acceleration on the track", at_least=0)
     inset_m: float = quantity(200.0, "starts keep this distance from the border", at_least=0)
