@@ -186,14 +186,8 @@ def test_the_underwater_preset():
     assert (s.period_s, s.periods, s.tracking.particles, s.tracking.resampling) == (5, 100, 1000, "spread")
     m, r = s.measurement, s.radio
     assert (m.source_db, m.spreading, m.frequency_khz, m.noise_db) == (120, 1.5, 10, 3)
-    assert (r.transmit_w, r.receive_w, r.listen_w, r.sleep_w, r.bit_rate, r.hop_m) == (
-        1.5,
-        0.025,
-        0.0125,
-        2e-4,
-        640,
-        250,
-    )
+    assert (r.transmit_w, r.receive_w, r.listen_w, r.sleep_w) == (1.5, 0.025, 0.0125, 2e-4)
+    assert (r.bit_rate, r.hop_m) == (640, 250)
     assert (r.report_bits, r.handover_bits, r.invitation_bits, r.wakeup_bits) == (64, 256, 32, 32)
     assert (s.detection.threshold_db, s.tracking.silent_information, s.filter_q) == (85, True, 0.01)
     assert (s.tracking.start_sd_m, s.tracking.start_sd_ms) == (20, 1)
