@@ -33,10 +33,11 @@ def same(a, b) -> bool:
     return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
 
 
-@pytest.mark.parametrize("scenario", ("PreDC-v0", "Rssi-v0"))
+@pytest.mark.parametrize("scenario", ("PreDC-v0", "Rssi-v0", "Underwater-v0"))
 @pytest.mark.parametrize("reward", ("error", "belief"))
 @pytest.mark.parametrize("action,observation", list(itertools.product(ACTIONS, OBSERVATIONS)))
 def test_check_env_passes_without_a_warning(scenario, action, observation, reward):
+    small = dict(particles=64, nodes=36, periods=7) if scenario == "Underwater-v0" else SMALL
     env = gym.make(
         f"wsn_env/{scenario}",
         action=action,
@@ -44,7 +45,7 @@ def test_check_env_passes_without_a_warning(scenario, action, observation, rewar
         reward=reward,
         render_mode="rgb_array",
         lam=(0.3, 30.0),
-        **SMALL,
+        **small,
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")

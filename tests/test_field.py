@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from wsn_env import Scenario, ScenarioError, World
 from wsn_env.physics.field import index, nearest
 from wsn_env.types import State
 
@@ -65,3 +66,29 @@ def test_a_grid_holds_every_node_once_in_its_cell(nodes):
     assert (np.diff(grid.starts[0]) >= 0).all()
     for start, stop in zip(grid.starts[0], grid.starts[0, 1:]):
         assert (np.diff(grid.nodes[0, start:stop]) > 0).all()
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.25, 0.5])
+def test_on_a_grid_every_node_keeps_to_its_cell(jitter):
+    scenario = Scenario.named("PreDC-v0", nodes=16, layout="grid", jitter=jitter, side_m=80, particles=2)
+    positions = World(scenario, threads=1).reset(np.arange(500)).network.positions
+    middle = np.stack([10 + 20 * (np.arange(16) % 4), 10 + 20 * (np.arange(16) // 4)], axis=1)
+    offset = (positions - middle) / 20
+    assert np.abs(offset).max() <= jitter + 1e-12
+    if jitter > 0:  # uniform, and independent
+        n = offset.size
+        assert abs(offset.mean()) < 4 * jitter / (3 * n) ** 0.5
+        assert abs(offset.var() / (jitter**2 / 3) - 1) < 4 * (0.8 / n) ** 0.5
+        assert abs(np.corrcoef(offset[:, 0].ravel(), offset[:, 1].ravel())[0, 1]) < 4 / 1000**0.5
+
+
+def test_a_fixed_grid_is_the_same_in_every_episode():
+    scenario = Scenario.named("Underwater-v0", field_seed=3, particles=2)
+    positions = World(scenario, threads=1).reset([1, 2]).network.positions
+    np.testing.assert_array_equal(*positions)
+
+
+@pytest.mark.parametrize("nodes", [2, 8, 63, 224])
+def test_a_grid_needs_a_square_number(nodes):
+    with pytest.raises(ScenarioError, match=rf"Field.nodes = {nodes}: must be a square number"):
+        Scenario.named("PreDC-v0", nodes=nodes, layout="grid")

@@ -25,7 +25,8 @@ def positive(low, high):
 def motions(draw):
     """Overrides that name a built-in motion with settings of all sizes that fit the field."""
     side, period = draw(positive(1, 1000)), draw(positive(0.01, 60))
-    name = draw(st.sampled_from(["crossing", "straight", "sine", "circle", "turns", "waypoint"]))
+    periods = draw(st.integers(1, 150))
+    name = draw(st.sampled_from(["crossing", "straight", "sine", "circle", "turns", "waypoint", "cruise"]))
     speed = positive(1e-3, side / period)
     own = {
         "crossing": lambda: dict(
@@ -42,8 +43,14 @@ def motions(draw):
         "circle": lambda: dict(circle_m=side * draw(positive(0.01, 0.5)), turn_s=period * draw(positive(1, 1000))),
         "turns": lambda: dict(speed_ms=draw(speed), turn_probability=draw(positive(0, 1))),
         "waypoint": lambda: dict(speed_ms=draw(speed)),
+        "cruise": lambda: dict(
+            speed_ms=draw(positive(1e-3, 0.99)) * 0.7 * side / (periods * period),
+            acceleration_ms2=draw(positive(0, 10)),
+            inset_m=0.2 * side,
+            margin_m=0.1 * side,
+        ),
     }[name]()
-    return dict(motion=name, side_m=side, period_s=period, periods=draw(st.integers(1, 150))) | own
+    return dict(motion=name, side_m=side, period_s=period, periods=periods) | own
 
 
 @settings(max_examples=150, deadline=None, derandomize=True)
@@ -305,3 +312,50 @@ def test_a_recording_outside_the_field_is_refused_unless_scaled(write):
 def test_recorded_needs_a_file():
     with pytest.raises(ScenarioError, match="Recorded.tracks"):
         Scenario.named("PreDC-v0", motion="recorded")
+
+
+CRUISE = dict(motion="cruise", side_m=1000.0, period_s=5.0)
+
+
+def test_a_cruise_starts_inside_at_its_speed_and_keeps_its_distance():
+    track = tracks(400, **CRUISE)
+    assert track[:, 0, ::2].min() >= 200 and track[:, 0, ::2].max() <= 800
+    assert track[:, :, ::2].min() >= 60 and track[:, :, ::2].max() <= 940
+    np.testing.assert_allclose(np.linalg.norm(track[:, 0, 1::2], axis=1), 1.0, rtol=1e-9)
+    heading = track[:, 0, 1::2].mean(axis=0)  # of unit vectors in all directions
+    assert (np.abs(heading) < 4 / (2 * 400) ** 0.5).all()
+
+
+def test_a_cruises_noise_is_white_acceleration():
+    """Short ones, of which none had to be drawn again for its noise."""
+    track = tracks(2000, periods=10, acceleration_ms2=0.02, **CRUISE)
+    velocity = track[:, :, 1::2]
+    a = np.diff(velocity, axis=1).ravel() / 5
+    assert abs(a.mean()) < 4 * 0.02 / a.size**0.5
+    assert abs(a.std() / 0.02 - 1) < 4 / (2 * a.size) ** 0.5
+    middle = (velocity[:, 1:] + velocity[:, :-1]) / 2
+    np.testing.assert_allclose(np.diff(track[:, :, ::2], axis=1), 5 * middle, atol=1e-9)
+
+
+def test_a_cruise_that_noise_would_drive_out_goes_without():
+    track = tracks(20, acceleration_ms2=50.0, **CRUISE)
+    assert track[:, :, ::2].min() >= 60 and track[:, :, ::2].max() <= 940
+    np.testing.assert_array_equal(track[:, 1:, 1::2], track[:, :-1, 1::2])
+
+
+@pytest.mark.parametrize(
+    ("overrides", "says"),
+    [
+        (
+            dict(inset_m=30.0),
+            "Cruise.inset_m = 30.0: must be at least margin_m = 60.0 and below half the side",
+        ),
+        (dict(inset_m=500.0), "Cruise.inset_m = 500.0"),
+        (dict(speed_ms=3.0), "Cruise.speed_ms = 3.0: must be at most 1.48 m/s"),
+        (dict(speed_ms=0), "Cruise.speed_ms = 0: must be a finite number above 0"),
+    ],
+)
+def test_cruises_without_room_are_refused(overrides, says):
+    with pytest.raises(ScenarioError) as problem:
+        tracks(1, **CRUISE, **overrides)
+    assert says in str(problem.value)

@@ -3,6 +3,7 @@
 import numba
 import numpy as np
 import pytest
+from scipy import special
 
 from wsn_env import draws, numerics
 from wsn_env.compiling import fast, piece
@@ -195,3 +196,25 @@ def test_regrouping_leaves_the_double_functions_within_four_ulp(name, uniform):
     function = over(fast(getattr(numerics, name)))
     for x in (uniform(0.01, 2), uniform(1, 700), 1 + uniform(-1e-9, 1e-9)):
         assert ulps(function(x), getattr(np, name)(x.astype(np.longdouble))).max() <= 4
+
+
+def test_the_normal_distribution_function_is_scipys(uniform):
+    normal_cdf = over(numerics.normal_cdf)
+    for x in (uniform(-37, 9), uniform(-1, 1), uniform(-1e-9, 1e-9), np.array([-37.5, -0.0, 0.0, 40.0, 1e300])):
+        np.testing.assert_allclose(normal_cdf(x), special.ndtr(x), rtol=1e-12)
+    assert numerics.normal_cdf(0.0) == 0.5
+    assert numerics.normal_cdf(-1e9) == numerics.normal_cdf(-np.inf) == 0 and numerics.normal_cdf(np.inf) == 1
+
+
+@pytest.mark.parametrize("mode", ["strict", "fast"])
+def test_its_logarithm_in_float32_is_scipys(mode, uniform):
+    function = numerics.log_normal_cdf32 if mode == "strict" else fast(numerics.log_normal_cdf32)
+    log_normal_cdf32 = over(function)
+    grid = np.concatenate([-binade(e)[::7] for e in (-3, 0, 2, 4)] + [binade(e)[::7] for e in (-3, 0, 2)])
+    for x in (uniform(-8, 8), uniform(-1e5, 0), uniform(-1e-3, 1e-3), grid):
+        x = x.astype(np.float32)
+        exact, got = special.log_ndtr(x.astype(float)), log_normal_cdf32(x)
+        assert (np.abs(got - exact) <= 2e-7 + 4e-7 * np.abs(exact)).all()
+        assert (got <= 0).all()
+    far = log_normal_cdf32(np.array([-np.inf, -3e38, 3e38, np.inf], np.float32))
+    assert (far[:2] < -1e29).all() and np.isfinite(far).all() and (far[2:] == 0).all()

@@ -9,6 +9,7 @@ import pytest
 
 from agents.nearest import Nearest
 from agents.pre_dc import PreDC
+from agents.strongest_signal import StrongestSignal
 from wsn_env import Scenario, View, World, draws, make_policy
 from wsn_env.physics.sensing import detection_probability
 from wsn_env.policies import policy_names
@@ -38,6 +39,7 @@ def chosen(cluster: Cluster, row: int) -> set[int]:
 
 def test_every_name_is_an_entry_point():
     expected = {"pre_dc", "centroid", "static_cluster", "random", "all", "ppo", *(f"nearest{n}" for n in range(9))}
+    expected |= {"strongest_signal"}
     assert expected <= set(policy_names())
     with pytest.raises(ValueError, match="did you mean pre_dc"):
         make_policy("predc", SCENARIO)
@@ -120,6 +122,60 @@ def test_nearest_counts_further_members_and_keeps_its_head(view, n):
     for row in range(40):
         others = [node for node in np.argsort(view.distance[row]) if node != cluster.head[row]][:n]
         assert chosen(cluster, row) == {*others, int(cluster.head[row])}
+
+
+UNDERWATER = Scenario.named("Underwater-v0", particles=50)
+
+
+@pytest.mark.parametrize("hysteresis_db", [0.0, 3.0, 10.0])
+def test_the_strongest_signal_leads_unless_the_head_is_nearly_as_strong(hysteresis_db):
+    view = View.of(walked(9, UNDERWATER, "strongest_signal"))
+    cluster = StrongestSignal(UNDERWATER, hysteresis_db=hysteresis_db).act(view)
+    changed = 0
+    for row in range(40):
+        n, old = view.reports.count[row], view.head[row]
+        level = dict(zip(view.reports.node[row, :n].tolist(), view.reports.value[row, :n, 0].tolist()))
+        best = max(level, key=level.get)
+        stays = level[best] < level.get(old, -np.inf) + hysteresis_db
+        assert cluster.head[row] == (old if stays else best)
+        changed += cluster.head[row] != old
+        hop = np.linalg.norm(view.positions[row] - view.positions[row, cluster.head[row]], axis=1) <= 250
+        assert chosen(cluster, row) == set(np.flatnonzero(hop))
+    assert changed > 0 or hysteresis_db == 10
+
+
+def test_the_strongest_signals_head_stays_in_silence_and_begins_at_the_prediction():
+    policy = StrongestSignal(UNDERWATER)
+    state = World(UNDERWATER, threads=1).reset(np.arange(40))
+    assert (policy.act(View.of(state)).head == View.of(state).nearest_living()).all()
+    state = walked(5, UNDERWATER, "strongest_signal")
+    state.reports.count[:] = 0
+    view = View.of(state)
+    cluster = policy.act(view)
+    assert (cluster.head == view.head).all()
+    assert all(chosen(cluster, row) == set(np.flatnonzero(view.member[row])) for row in range(40))
+
+
+def test_the_strongest_signal_passes_over_the_dead():
+    state = walked(5, UNDERWATER, "strongest_signal")
+    for row in range(40):  # all that reported but the old head
+        nodes = state.reports.node[row, : state.reports.count[row]]
+        state.network.battery[row, nodes[nodes != state.network.head[row]]] = 0.0
+    view = View.of(state)
+    cluster = StrongestSignal(UNDERWATER, hysteresis_db=0.0).act(view)
+    assert (cluster.head == view.head).all()
+    assert all(view.alive[row, list(chosen(cluster, row))].all() for row in range(40))
+
+
+def test_the_strongest_signal_needs_a_level():
+    with pytest.raises(ValueError, match="needs a measured level in dB.*is a Position"):
+        make_policy("strongest_signal", SCENARIO)
+    land = Scenario.named("Rssi-v0", particles=50)
+    view = View.of(walked(3, land))
+    cluster = make_policy("strongest_signal", land).act(view)  # a radio has no hop: the sensing radius stands for it
+    for row in range(40):
+        near = np.linalg.norm(view.positions[row] - view.positions[row, cluster.head[row]], axis=1) <= 10
+        assert chosen(cluster, row) == set(np.flatnonzero(near))
 
 
 def test_random_repeats_itself_and_differs_between_rows_and_periods(view):

@@ -73,6 +73,12 @@ from wsn_env.sections import Detection, Field, Motion, Position, Radio, Rssi, Si
         (dict(field=Radio()), ["Scenario.field", "must be a Field"]),
         (dict(nods=5), ["'nods'", "did you mean nodes"]),
         (dict(xyzzy=5), ["'xyzzy'", "known are"]),
+        (dict(layout="hexagons"), ["Field.layout = 'hexagons'", "uniform, grid"]),
+        (dict(jitter=0.6), ["Field.jitter = 0.6", "at most 0.5"]),
+        (dict(resampling="residual"), ["Tracking.resampling = 'residual'", "systematic, spread"]),
+        (dict(spread_scale=-1), ["Tracking.spread_scale = -1", "at least 0"]),
+        (dict(resampling="spread", tracker="ekf"), ["Tracking.resampling = 'spread'", "'systematic'", "'ekf'"]),
+        (dict(redraw_on_handover=True, tracker="snapshot"), ["Tracking.redraw_on_handover = True", "allowed is False"]),
         (dict(amplitude_m=5), ["'amplitude_m'"]),  # not of this motion
     ],
 )
@@ -172,6 +178,19 @@ def test_table_1_is_the_default():
     )
     assert (s.filter_q, s.measurement.noise_m, d.reach_m, s.handover_bits) == (0.05, 2, 12, 448)
     assert s.override(handover="particles").handover_bits == 800_000
+
+
+def test_the_underwater_preset():
+    s = Scenario.named("Underwater-v0")
+    assert (s.field.nodes, s.field.side_m, s.field.layout, s.field.jitter) == (64, 1000, "grid", 0.25)
+    assert (s.period_s, s.periods, s.tracking.particles, s.tracking.resampling) == (5, 100, 1000, "spread")
+    m, r = s.measurement, s.radio
+    assert (m.source_db, m.spreading, m.frequency_khz, m.noise_db) == (120, 1.5, 10, 3)
+    assert (r.transmit_w, r.receive_w, r.listen_w, r.sleep_w) == (1.5, 0.025, 0.0125, 2e-4)
+    assert (r.bit_rate, r.hop_m) == (640, 250)
+    assert (r.report_bits, r.handover_bits, r.invitation_bits, r.wakeup_bits) == (64, 256, 32, 32)
+    assert (s.detection.threshold_db, s.tracking.silent_information, s.filter_q) == (85, True, 0.01)
+    assert (s.tracking.start_sd_m, s.tracking.start_sd_ms) == (20, 1)
 
 
 def test_whole_numbers_become_integers():

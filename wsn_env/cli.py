@@ -42,7 +42,7 @@ class Reproduce:
     """Rebuild a published system's tables and figures, with a verdict for each of its claims."""
 
     paper: Annotated[str, tyro.conf.Positional]
-    """Which: pre_dc, grnn."""
+    """Which: pre_dc, binary, grnn, underwater; all: each into a folder of its own."""
     out: Path
     """Folder for the tables and pictures."""
     runs: int = 100

@@ -142,7 +142,7 @@ class Cruise(Motion):
     variance D T^3 / 12 then, which is negligible beside any measurement here.
     """
 
-    fitting_q: ClassVar[float] = 0.015
+    fitting_q: ClassVar[float] = 0.01
     speed_ms: float = quantity(1.0, "speed at the start", above=0)
     acceleration_ms2: float = quantity(0.01, "sd of the white acceleration on the track", at_least=0)
     inset_m: float = quantity(200.0, "starts keep this distance from the border", at_least=0)
@@ -503,7 +503,8 @@ class Modem(Link):
     the head cannot be its member nor report to it; a handover farther than that is relayed, at the old head's
     expense. An awake node listens for the whole period; a node that a search wakes has paid for its sleep already.
 
-    50 kJ (four lithium D cells have some more) are 46 days of listening or eight years of sleep.
+    50 kJ, about four alkaline AA cells, are 46 days of listening or eight years of sleep; the 64 nodes of Underwater-v0
+    together last for three months of tracking by the strongest signal (2.1 J a period).
     """
 
     transmit_w: float = quantity(1.5, "power while sending", at_least=0)

@@ -46,9 +46,20 @@ class Record:
     target_m: np.ndarray  # (R, K, 2)
     estimate_m: np.ndarray  # (R, K, 2) after the period's correction
     energy_mj: np.ndarray  # (R, K)
-    report_mj: np.ndarray  # (R, K) the part of the energy that reports took
-    heard: np.ndarray  # (R, K) bool: the head had a report
+    purposes_mj: np.ndarray  # (R, K, 6) the same by PURPOSES
     detections: np.ndarray  # (R, K) nodes that had something to report
+    delivered: np.ndarray  # (R, K) reports that the head had
+    handover: np.ndarray  # (R, K) bool
+
+    @property
+    def report_mj(self) -> np.ndarray:
+        """(R, K) the part of the energy that reports took."""
+        return self.purposes_mj[:, :, REPORT]
+
+    @property
+    def heard(self) -> np.ndarray:
+        """(R, K) bool: the head had a report."""
+        return self.delivered > 0
 
     @property
     def offset_m(self) -> np.ndarray:
@@ -112,9 +123,8 @@ def play_all(trials: Iterable[Trial], progress: Progress) -> dict[Trial, Record]
 def _play_block(world: World, policy, runs: range, tick) -> tuple[np.ndarray, ...]:
     periods = []
     for _, outcome in episodes(policy, world, [FIRST_SEED + run for run in runs]):
-        report_mj = 1e3 * outcome.energy_j[:, REPORT]
-        heard = outcome.delivered > 0
-        periods.append((outcome.target_m, outcome.estimate_m, outcome.energy_mj, report_mj, heard, outcome.detections))
+        energy, reports = (outcome.energy_mj, 1e3 * outcome.energy_j), (outcome.detections, outcome.delivered)
+        periods.append((outcome.target_m, outcome.estimate_m, *energy, *reports, outcome.handover))
         tick()
     return tuple(np.stack(arrays, axis=1) for arrays in zip(*periods, strict=True))
 

@@ -1,0 +1,164 @@
+"""The tables and pictures of the underwater system."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from wsn_env.papers.report import Sheet, write_picture, write_sheet
+from wsn_env.papers.rollout import Record
+from wsn_env.papers.underwater.claims import energy_j
+from wsn_env.papers.underwater.systems import (
+    HANDOVERS,
+    HYSTERESES_DB,
+    PARTICLES,
+    RESAMPLING_NOISES,
+    RESAMPLINGS,
+    SMOOTH,
+    THRESHOLDS_DB,
+    Results,
+    lost,
+    rmse_m,
+)
+from wsn_env.physics.acoustics import absorption_db_per_km, ambient_noise_db
+from wsn_env.scenario import Scenario
+from wsn_env.types import PURPOSES
+
+# Okabe and Ito's colours, which colour-blind readers tell apart.
+COLOURS = dict(zip(PURPOSES, ("#56B4E9", "#009E73", "#F0E442", "#0072B2", "#CC79A7", "#999999"), strict=True))
+LOOKS = {
+    "systematic": dict(color="#D55E00"),
+    "spread": dict(color="#0072B2"),
+    "carried": dict(linestyle="-"),
+    "redrawn": dict(linestyle="--"),
+}
+FREQUENCIES_KHZ = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
+
+
+def write(out: Path, results: Results) -> None:
+    """Every table as CSV, and three pictures."""
+    sheets = {
+        "acoustics": acoustics(),
+        "resampling": resampling(results),
+        "error": error_per_period(results),
+        "thresholds": thresholds(results),
+        "hysteresis": hysteresis(results),
+    }
+    for name, sheet in sheets.items():
+        write_sheet(out / f"{name}.csv", sheet)
+    write_picture(out / "error.png", draw_error(sheets["error"]))
+    write_picture(out / "thresholds.png", draw_thresholds(results))
+    write_picture(out / "energy.png", draw_energy(results))
+
+
+def acoustics() -> Sheet:
+    """Absorption (Thorp) and ambient noise (Wenz) against frequency."""
+    rows = [(f, absorption_db_per_km(f), ambient_noise_db(f)) for f in FREQUENCIES_KHZ]
+    return Sheet(("frequency_khz", "absorption_db_per_km", "noise_db"), rows)
+
+
+def resampling(results: Results) -> Sheet:
+    """Every cell of the resampling table."""
+    rows = []
+    for noise in RESAMPLING_NOISES:
+        for particles in PARTICLES:
+            for handover in HANDOVERS:
+                for name in RESAMPLINGS:
+                    record = results.resampling(noise, particles, handover, name)
+                    rows.append((noise, particles, handover, name, *rmse_m(record), lost(record).mean(), results.runs))
+    columns = ("noise_m2s3", "particles", "handover", "resampling", "rmse_m", "stderr_m", "lost", "runs")
+    return Sheet(columns, rows)
+
+
+def error_per_period(results: Results) -> Sheet:
+    """Mean error over the runs in each period: smooth motion, 300 particles."""
+    cells = [(name, handover) for name in RESAMPLINGS for handover in HANDOVERS]
+    errors = [
+        np.sqrt(results.resampling(SMOOTH, 300, handover, name).square_error()).mean(axis=0) for name, handover in cells
+    ]
+    rows = [(k + 1, *values) for k, values in enumerate(zip(*errors, strict=True))]
+    return Sheet(("period", *(f"{name}_{handover}_m" for name, handover in cells)), rows)
+
+
+def thresholds(results: Results) -> Sheet:
+    """Error, reports and energy by purpose against the threshold, with and without what silence tells."""
+    rows = []
+    for threshold_db in THRESHOLDS_DB:
+        radius_m = Scenario.named("Underwater-v0", threshold_db=threshold_db).radius_m
+        for silent in (False, True):
+            record = results.threshold(threshold_db, silent)
+            rows.append((threshold_db, radius_m, silent, *rmse_m(record), *_costs(record)))
+    return Sheet(("threshold_db", "radius_m", "silence_told", "rmse_m", "stderr_m", *COSTS), rows)
+
+
+def hysteresis(results: Results) -> Sheet:
+    """Error, handovers and energy by purpose against the head's hysteresis."""
+    rows = []
+    for hysteresis_db in HYSTERESES_DB:
+        record = results.hysteresis(hysteresis_db)
+        rows.append((hysteresis_db, *rmse_m(record), record.handover.mean(), *_costs(record)))
+    return Sheet(("hysteresis_db", "rmse_m", "stderr_m", "handovers", *COSTS), rows)
+
+
+COSTS = ("reports", "energy_j", *(f"{purpose}_j" for purpose in PURPOSES))
+
+
+def _costs(record: Record) -> tuple[float, ...]:
+    return record.delivered.mean(), record.energy_mj.mean() / 1e3, *energy_j(record).values()
+
+
+def draw_error(sheet: Sheet):
+    """How systematic resampling loses the target."""
+    figure, axes = _axes("Smooth motion, 300 particles", "period (5 s)", "mean error over the runs [m]")
+    period, *columns = (np.array(column, dtype=float) for column in zip(*sheet.rows, strict=True))
+    for name, values in zip(sheet.columns[1:], columns, strict=True):
+        resampling, handover, _ = name.split("_")
+        label = f"{resampling}, particles {handover}"
+        axes.plot(period, values, label=label, linewidth=1.5, **LOOKS[resampling], **LOOKS[handover])
+    axes.set(xlim=(0, period[-1] + 1))
+    axes.set_ylim(bottom=0)
+    axes.legend(frameon=False)
+    return figure
+
+
+def draw_thresholds(results: Results):
+    """Energy against error."""
+    figure, axes = _axes("Threshold of a report, from 80 to 92 dB", "energy [J per period]", "RMSE [m]")
+    for silent, label, colour in ((False, "silence ignored", "#D55E00"), (True, "silence told", "#0072B2")):
+        records = [results.threshold(threshold_db, silent) for threshold_db in THRESHOLDS_DB]
+        energy = [record.energy_mj.mean() / 1e3 for record in records]
+        rmse, doubt = zip(*map(rmse_m, records), strict=True)
+        axes.errorbar(energy, rmse, yerr=doubt, marker="o", markersize=4, capsize=2, color=colour, label=label)
+        for x, y, threshold_db in zip(energy, rmse, THRESHOLDS_DB, strict=True):
+            if silent:
+                axes.annotate(f"{threshold_db:g}", (x, y), xytext=(0, -14), textcoords="offset points", ha="center")
+    axes.legend(frameon=False)
+    return figure
+
+
+def draw_energy(results: Results):
+    """Energy of a period by purpose."""
+    figure, axes = _axes("What the energy is for", "threshold [dB]", "energy [J per period]")
+    names = [f"{threshold_db:g}" for threshold_db in THRESHOLDS_DB]
+    spent = [energy_j(results.threshold(threshold_db, True)) for threshold_db in THRESHOLDS_DB]
+    base = np.zeros(len(names))
+    for purpose in PURPOSES:
+        joules = np.array([energies[purpose] for energies in spent])
+        if joules.any():
+            label = "listening, sleeping" if purpose == "sensing" else purpose
+            axes.bar(names, joules, bottom=base, label=label, color=COLOURS[purpose])
+        base += joules
+    axes.legend(frameon=False)
+    return figure
+
+
+def _axes(title: str, x: str, y: str):
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.0, 4.2), layout="constrained")
+    axes = figure.subplots()
+    axes.set(title=title, xlabel=x, ylabel=y)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(alpha=0.25)
+    return figure, axes
