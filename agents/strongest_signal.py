@@ -9,7 +9,7 @@ import numpy as np
 
 from agents.base import ViewPolicy
 from wsn_env.physics.field import distances_to
-from wsn_env.sections import Level
+from wsn_env.sections import Level, Position
 from wsn_env.types import Cluster
 from wsn_env.view import View
 
@@ -21,31 +21,39 @@ class StrongestSignal(ViewPolicy):
     The old head stays unless another node was stronger by `hysteresis_db`; one that kept silent itself gives way to
     any. Without a report the cluster's head stays; with no head yet it is the living node nearest to the prediction.
     No motion model.
+
+    A signal is the level in dB, or the power, that a node reports; where nodes report positions, one that falls with
+    the square of the distance to what the node reports.
     """
 
     hysteresis_db: float = 3.0
     hop_m: float | None = None  # None: the modem's; the sensing radius where the radio has no limit
 
-    def __post_init__(self):
-        measurement = self.scenario.measurement
-        if not isinstance(measurement, Level):
-            raise ValueError(
-                "policy strongest_signal needs a measured level in dB: Scenario.measurement must be a Rssi or Sonar, it"
-                f" is a {type(measurement).__name__}"
-            )
-
     def act(self, view: View) -> Cluster:
         """Follow, for every row."""
-        level = np.where(view.detected & view.alive, view.measured[:, :, 0], -np.inf)
-        strongest = level.argmax(axis=1)
+        signal = np.where(view.detected & view.alive, self._signal(view), -np.inf)
+        strongest = signal.argmax(axis=1)
         standing = view.head >= 0
-        own = np.where(standing, level[view.rows, np.maximum(view.head, 0)], -np.inf)
-        best = level[view.rows, strongest]
-        stay = standing & ((best == -np.inf) | (best < own + self.hysteresis_db))
+        own = np.where(standing, signal[view.rows, np.maximum(view.head, 0)], -np.inf)
+        best = signal[view.rows, strongest]
+        stay = standing & ((best == -np.inf) | (best < self._raised(own)))
         head = np.where(stay, view.head, np.where(best > -np.inf, strongest, view.nearest_living()))
         centre = view.positions[view.rows, np.maximum(head, 0)]
         members = view.alive & (distances_to(view.positions, centre) <= self._hop_m()) & (head >= 0)[:, None]
         return Cluster.of(head, members)
+
+    def _signal(self, view: View) -> np.ndarray:
+        """(B, S) of the nodes that reported."""
+        if not isinstance(self.scenario.measurement, Position):
+            return view.measured[:, :, 0]
+        offset = view.measured - view.positions
+        return 1.0 / np.maximum((offset * offset).sum(axis=2), 1e-6)
+
+    def _raised(self, signal: np.ndarray) -> np.ndarray:
+        """So much stronger another has to be."""
+        if isinstance(self.scenario.measurement, Level):
+            return signal + self.hysteresis_db
+        return signal * 10 ** (self.hysteresis_db / 10)
 
     def _hop_m(self) -> float:
         if self.hop_m is not None:

@@ -10,17 +10,9 @@ from hypothesis import strategies as st
 from tests.worlds import KEYS, assert_same, choices, keys_of, leaves, living_entries, play, scenarios
 from wsn_env import Cluster, Scenario, View, World, make_policy
 from wsn_env.interface import Interface, Settings
-from wsn_env.sections import Level
 
-HAND_WRITTEN = ["all", "boundary", "centroid", "nearest0", "nearest3", "pre_dc", "random", "static_cluster"]
-FOR_LEVELS = ["strongest_signal"]  # needs a measured level in dB
+HAND_WRITTEN = "all boundary centroid nearest0 nearest3 pre_dc random static_cluster strongest_signal".split()
 SEEDS = st.integers(0, 2**32 - 1)
-
-
-def policies_for(scenario):
-    """Every hand-written policy that can play the scenario."""
-    names = HAND_WRITTEN + (FOR_LEVELS if isinstance(scenario.measurement, Level) else [])
-    return [make_policy(name, scenario) for name in names]
 
 
 def law(examples):
@@ -150,7 +142,7 @@ def test_the_truth_does_not_show(scenario, seed):
             ("nodes", "view", "nearest"),
         ]
     ]
-    policies = policies_for(scenario)
+    policies = [make_policy(name, scenario) for name in HAND_WRITTEN]
     rng = np.random.default_rng(seed)
     for _, _, state, _ in play(scenario, keys_of(seed, 3), seed):
         false = state.copy()._replace(track=rng.normal(0, 1e3, state.track.shape), key=keys_of(seed + 2, 3))
@@ -261,7 +253,7 @@ def test_everything_is_finite_always(scenario, seed):
         Interface(scenario, Settings(observation=o, order=r))
         for o, r in [("candidates", "information"), ("dict", "nearest"), ("view", "nearest")]
     ]
-    policies = policies_for(scenario)
+    policies = [make_policy(name, scenario) for name in HAND_WRITTEN]
     for _, cluster, state, outcome in play(scenario, keys_of(seed, 3), seed):
         assert_finite(state, outcome)
         assert (np.diagonal(state.belief.cov, axis1=1, axis2=2) >= 0).all()
@@ -287,9 +279,8 @@ def test_everything_is_finite_always(scenario, seed):
 
 
 @law(120)
-@given(scenarios(battery_j=5e-5), SEEDS, st.sampled_from(HAND_WRITTEN + FOR_LEVELS))
+@given(scenarios(battery_j=5e-5), SEEDS, st.sampled_from(HAND_WRITTEN))
 def test_policies_carry_on_to_the_last_node_and_beyond(scenario, seed, name):
-    name = "all" if name in FOR_LEVELS and not isinstance(scenario.measurement, Level) else name
     world, policy = World(scenario, threads=1), make_policy(name, scenario)
     state = world.reset(keys_of(seed, 3))
     for _ in range(scenario.periods):
@@ -338,7 +329,7 @@ def test_time_beyond_the_horizon_stands_still():
 @given(scenarios(), SEEDS)
 def test_a_view_survives_its_arrays(scenario, seed):
     """Observation "view" holds all that a policy can see."""
-    policies = policies_for(scenario)
+    policies = [make_policy(name, scenario) for name in HAND_WRITTEN]
     for _, _, state, _ in play(scenario, keys_of(seed, 2), seed):
         view = View.of(state)
         again = View.from_arrays(view.as_arrays())

@@ -167,15 +167,28 @@ def test_the_strongest_signal_passes_over_the_dead():
     assert all(view.alive[row, list(chosen(cluster, row))].all() for row in range(40))
 
 
-def test_the_strongest_signal_needs_a_level():
-    with pytest.raises(ValueError, match="needs a measured level in dB.*is a Position"):
-        make_policy("strongest_signal", SCENARIO)
-    land = Scenario.named("Rssi-v0", particles=50)
-    view = View.of(walked(3, land))
-    cluster = make_policy("strongest_signal", land).act(view)  # a radio has no hop: the sensing radius stands for it
+@pytest.mark.parametrize("measurement", ["position", "rssi", "rssi_power"])
+def test_the_strongest_signal_on_land(measurement):
+    """A radio has no hop: the sensing radius stands for it. 3 dB are a factor of 2 of power."""
+    land = SCENARIO.override(measurement=measurement)
+    view = View.of(walked(6, land))
+    cluster = make_policy("strongest_signal", land).act(view)
+    changed = 0
     for row in range(40):
+        n, old = view.reports.count[row], view.head[row]
         near = np.linalg.norm(view.positions[row] - view.positions[row, cluster.head[row]], axis=1) <= 10
         assert chosen(cluster, row) == set(np.flatnonzero(near))
+        nodes, values = view.reports.node[row, :n], view.reports.value[row, :n]
+        if measurement == "position":
+            power = np.linalg.norm(values - view.positions[row, nodes], axis=1) ** -2
+        else:
+            power = 10 ** (values[:, 0] / 10) if measurement == "rssi" else values[:, 0]
+        signal = dict(zip(nodes.tolist(), power.tolist()))
+        best = max(signal, key=signal.get, default=old)
+        stays = n == 0 or (old in signal and signal[best] < 10**0.3 * signal[old])
+        assert cluster.head[row] == (old if stays else best)
+        changed += cluster.head[row] != old
+    assert changed > 3
 
 
 def test_random_repeats_itself_and_differs_between_rows_and_periods(view):

@@ -293,13 +293,15 @@ class Position(Measurement):
     noise_m: float = quantity(2.0, "sd of each coordinate", above=0)
 
 
-FARTHEST_M = 1e7
+FARTHEST_M = 1e7  # as far as a mean level is followed
 
 
 class Level(Measurement):
-    """Base of strengths in dB, with Gaussian noise of sd `noise_db` about
+    """Base of strengths in dB, with the mean level
 
-    h(d) = level at 1 m - 10 n log10(d) - absorption d,    d at least `floor_m`
+        h(d) = level at 1 m - 10 n log10(d) - absorption d,    d at least `floor_m`
+
+    and Gaussian noise of sd `noise_db`.
     """
 
     exponent: float
@@ -502,6 +504,7 @@ class Modem(Link):
     so that the power of sending and of receiving is an energy per bit, whatever the distance. A node beyond one hop of
     the head cannot be its member nor report to it; a handover farther than that is relayed, at the old head's
     expense. An awake node listens for the whole period; a node that a search wakes has paid for its sleep already.
+    Listening and sleeping are charged as sensing.
 
     50 kJ, about four alkaline AA cells, are 46 days of listening or eight years of sleep; the 64 nodes of Underwater-v0
     together last for three months of tracking by the strongest signal (2.1 J a period).

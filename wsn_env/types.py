@@ -250,7 +250,7 @@ OUTCOME = np.dtype(
         ("members", "i8"),  # awake nodes, head included; all that woke in a search
         ("detections", "i8"),  # awake nodes that detected; of binary sensors, those that had a state to report
         ("delivered", "i8"),  # reports the head had, its own included
-        ("dropped", "i8"),  # chosen nodes that were dead or named twice or out of range
+        ("dropped", "i8"),  # chosen nodes that were dead, named twice, unknown, or beyond one hop of the head
         ("handover", "?"),  # the head's role went to another node
         ("searched", "?"),
         ("resampled", "?"),

@@ -132,7 +132,7 @@ def draw_thresholds(results: Results):
         axes.errorbar(energy, rmse, yerr=doubt, marker="o", markersize=4, capsize=2, color=colour, label=label)
         for x, y, threshold_db in zip(energy, rmse, THRESHOLDS_DB, strict=True):
             if silent:
-                axes.annotate(f"{threshold_db:g}", (x, y), xytext=(0, -14), textcoords="offset points", ha="center")
+                axes.annotate(f"{threshold_db:g}", (x, y), xytext=(5, 4), textcoords="offset points")
     axes.legend(frameon=False)
     return figure
 
