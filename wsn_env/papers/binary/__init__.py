@@ -1,8 +1,8 @@
 """Binary sensors: locating and tracking with one bit (Zhou, Cheng & Xing, 2009), its experiments beside ours.
 
 600 nodes in 500 m x 500 m sense within R = 60 m; in every period of T = 1 s those whose state has changed since the
-last report it to a sink. The target goes from (0, 500) m at (10, -10) m/s; what counts is the steady part, 15 to 40 s. All
-nodes are awake, and a first search tells the sink who detects at the start.
+last report it to a sink. The target goes from (0, 500) m at (10, -10) m/s; what counts is the steady part, 15 to 40 s.
+All nodes are awake, and a first search tells the sink who detects at the start.
 
 A system is a tracker (see trackers/boundary.py) and where it starts:
 
