@@ -14,8 +14,8 @@ from wsn_env.view import View
 
 @dataclass(frozen=True)
 class Centroid(ViewPolicy):
-    """Head: the living node nearest to the centroid of the nodes that detected last (binary sensors: that are known to
-    detect); members: the living nodes within the sensing radius of it. No motion model.
+    """Head: the living node nearest to the centroid of the nodes that detected last; members: the living nodes within
+    the sensing radius of it. No motion model.
 
     Without a detection the cluster stays; with no cluster yet, the estimate stands for the centroid.
     """

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from tests.worlds import KEYS, assert_same, choices, keys_of, leaves, living_entries, play, scenarios
 from wsn_env import Cluster, Scenario, View, World, make_policy
 from wsn_env.interface import Interface, Settings
+from wsn_env.sections import BOUNDARY_TRACKERS
 
 HAND_WRITTEN = "all boundary centroid nearest0 nearest3 pre_dc random static_cluster strongest_signal".split()
 SEEDS = st.integers(0, 2**32 - 1)
@@ -291,9 +292,11 @@ def test_policies_carry_on_to_the_last_node_and_beyond(scenario, seed, name):
         assert_finite(state, outcome)
 
 
-@pytest.mark.parametrize("tracker", ["particle", "ekf", "snapshot"])
+@pytest.mark.parametrize("tracker", ["particle", "ekf", "snapshot", *BOUNDARY_TRACKERS])
 def test_a_dead_network_goes_on_predicting(tracker):
-    scenario = Scenario.named("PreDC-v0", tracker=tracker, particles=50, battery_j=1e-9, sensing_nj=2.0, nodes=3)
+    measurement = "binary" if tracker in BOUNDARY_TRACKERS else "position"
+    poor = dict(particles=50, battery_j=1e-9, sensing_nj=2.0, nodes=3)
+    scenario = Scenario.named("PreDC-v0", tracker=tracker, measurement=measurement, **poor)
     world = World(scenario, threads=1)
     state = world.reset([1])
     everybody = Cluster(np.zeros(1, int), np.array([[0, 1, 2]]))

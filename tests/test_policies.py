@@ -7,6 +7,7 @@ import textwrap
 import numpy as np
 import pytest
 
+from agents.boundary import Boundary
 from agents.nearest import Nearest
 from agents.pre_dc import PreDC
 from agents.strongest_signal import StrongestSignal
@@ -38,8 +39,8 @@ def chosen(cluster: Cluster, row: int) -> set[int]:
 
 
 def test_every_name_is_an_entry_point():
-    expected = {"pre_dc", "centroid", "static_cluster", "random", "all", "ppo", *(f"nearest{n}" for n in range(9))}
-    expected |= {"strongest_signal"}
+    expected = {f"nearest{n}" for n in range(9)}
+    expected |= set("pre_dc boundary centroid static_cluster strongest_signal random all ppo".split())
     assert expected <= set(policy_names())
     with pytest.raises(ValueError, match="did you mean pre_dc"):
         make_policy("predc", SCENARIO)
@@ -101,6 +102,56 @@ def test_centroid_has_no_motion_model(view):
         distance = np.hypot(*(view.positions[row] - view.positions[row][heard].mean(axis=0)).T)
         assert cluster.head[row] == distance.argmin()
         assert chosen(cluster, row) == set(np.flatnonzero(distance <= 10)) | {int(cluster.head[row])}
+
+
+def test_centroid_follows_the_binary_sensors_that_see_the_target():
+    """Those that have reported nothing new, too."""
+    scenario = Scenario.named("Binary-v0", particles=200)
+    view = View.of(walked(9, scenario, "centroid"))
+    assert (view.sees.sum(axis=1) > view.detected.sum(axis=1)).any()
+    head = make_policy("centroid", scenario).act(view).head
+    for row in np.flatnonzero(view.sees.any(axis=1)):
+        distance = np.hypot(*(view.positions[row] - view.positions[row][view.sees[row]].mean(axis=0)).T)
+        assert head[row] == distance.argmin()
+
+
+def test_boundary_wakes_the_ring():
+    scenario = Scenario.named("Binary-v0", particles=200, period_s=2.0, periods=25)
+    view = View.of(walked(5, scenario, "boundary"))
+    dead = view.battery.copy()
+    dead[:, ::3] = 0.0
+    view = View(view.row, view.belief, view.network._replace(battery=dead), view.reports)
+    cluster = Boundary(scenario, width_m=4.0, sds=2.0).act(view)
+    for row in range(40):
+        speed = np.hypot(*view.predicted_mean[row, 1::2])
+        band = 4.0 + speed * 2.0 / 2 + 2.0 * view.spread_m[row]
+        ring = (dead[row] > 0) & (abs(view.distance[row] - 60.0) <= band)
+        assert chosen(cluster, row) == set(np.flatnonzero(ring))
+        assert cluster.head[row] == np.where(ring, view.distance[row], np.inf).argmin()
+
+
+def test_boundary_falls_back_on_the_nearest_node():
+    scenario = Scenario.named("Binary-v0", particles=200, positions=((250, 250), (240, 250)), nodes=2)
+    view = View.of(World(scenario, threads=1).reset([1]))
+    view.belief["predicted_mean"][0] = [249, 0, 250, 0]
+    view.belief["predicted_cov"][0] = np.eye(4)
+    cluster = make_policy("boundary", scenario).act(view)
+    assert chosen(cluster, 0) == {0}
+
+
+def test_boundary_hears_as_much_as_all_at_less_cost():
+    """Where the target is followed, few change their state outside of the ring; sensing has its price here."""
+    errors, energies = {}, {}
+    for name in ("all", "boundary"):
+        scenario = Scenario.named("Binary-v0", particles=2000, sensing_nj=1000.0)
+        world, policy = World(scenario, threads=1), make_policy(name, scenario)
+        state = world.reset([draws.key_of_seed(seed) for seed in range(10)])
+        played = []
+        for _ in range(scenario.periods):
+            state, outcome = world.step(state, policy.act(View.of(state)), donate=True)
+            played.append((outcome.error_m, outcome.energy_mj))
+        errors[name], energies[name] = np.array(played).mean(axis=(0, 2))
+    assert errors["boundary"] < 1.5 * errors["all"] and energies["boundary"] < 0.9 * energies["all"]
 
 
 def test_static_cluster_and_all(view):

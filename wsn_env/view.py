@@ -83,8 +83,11 @@ class View:
 
     @cached_property
     def sees(self) -> np.ndarray:
-        """(B, S) bool: who detects the target, as far as known: `detected`; the bitmap of binary sensors."""
-        return self.reports.bitmap > 0 if self.reports.bitmap.shape[1] else self.detected
+        """(B, S) bool: who detected the target in the last period: `detected`; of binary sensors those that were awake,
+        or asked in a search, and whose state is 1."""
+        if not self.reports.bitmap.shape[1]:
+            return self.detected
+        return (self.reports.bitmap > 0) & (self.member | self.detected)
 
     @cached_property
     def measured(self) -> np.ndarray:

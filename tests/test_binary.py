@@ -1,0 +1,250 @@
+"""Binary sensors in the world: who reports, what the sink knows, what it costs; the particle filter on the bitmap."""
+
+import numpy as np
+import pytest
+
+from wsn_env import Cluster, Scenario, View, World
+from wsn_env.physics.constants import constants
+from wsn_env.quantity import ScenarioError
+from wsn_env.sections import BOUNDARY_TRACKERS
+from wsn_env.trackers.kernels import weigh_state, weigh_states
+
+REPORT, SEARCH = 3, 5
+
+
+def scene(**overrides):
+    """A target that crosses a field of a hundred nodes, some of which it meets twice."""
+    scene = dict(
+        nodes=100,
+        side_m=200.0,
+        radius_m=40.0,
+        motion="legs",
+        start_m=(20, 20),
+        legs=((10, 12, 8), (10, -6, 6), (10, 10, -12)),
+        periods=30,
+        particles=20,
+        search=False,
+    )
+    return Scenario.named("Binary-v0", **(scene | overrides))
+
+
+def play(scenario, choose=None, key=1):
+    """Yields (awake (S,), state, outcome) each period; `choose(period)` gives who is awake, all by default."""
+    world, nodes = World(scenario, threads=1), scenario.field.nodes
+    state = world.reset([key])
+    for k in range(scenario.periods):
+        awake = np.ones(nodes, bool) if choose is None else choose(k)
+        state, outcome = world.step(state, Cluster.of([awake.argmax()], awake[None]))
+        yield awake, state, outcome
+
+
+def truth(state):
+    """(S,) bool: who is within reach of the target now."""
+    offset = state.network.positions[0] - state.track[0, state.period[0], ::2]
+    return (offset**2).sum(axis=1) < 40.0**2
+
+
+def told(state):
+    """{node: (state, whether it has changed)} of the period's reports."""
+    n = state.reports.count[0]
+    return {int(i): tuple(v) for i, v in zip(state.reports.node[0, :n], state.reports.value[0, :n], strict=True)}
+
+
+def some(k):
+    """Half of the nodes, others in every period."""
+    return np.random.default_rng(k).random(100) < 0.5
+
+
+# --- who reports --------------------------------------------------------------------------------------------
+
+
+def test_those_report_whose_state_has_changed_and_the_sink_knows_all():
+    before = np.zeros(100, bool)
+    for _, state, outcome in play(scene()):
+        now = truth(state)
+        assert told(state) == {i: (now[i], 1) for i in np.flatnonzero(now != before)}
+        assert outcome.detections[0] == outcome.delivered[0] == (now != before).sum()
+        np.testing.assert_array_equal(state.reports.bitmap[0], now)
+        np.testing.assert_array_equal(state.sensed[0], now)
+        before = now
+
+
+def test_who_has_slept_compares_with_what_it_sensed_last():
+    """Before it has ever sensed that is 0: its first report is a 1."""
+    last, first_ones, late_zeros = np.zeros(100, bool), 0, 0
+    ever, awake_before = np.zeros(100, bool), np.zeros(100, bool)
+    for awake, state, _ in play(scene(), some):
+        now = truth(state)
+        changed = awake & (now != last)
+        assert told(state) == {i: (now[i], 1) for i in np.flatnonzero(changed)}
+        first_ones += (changed & ~ever).sum()
+        late_zeros += (changed & ~now & ~awake_before).sum()
+        last, ever, awake_before = np.where(awake, now, last), ever | awake, awake
+        np.testing.assert_array_equal(state.sensed[0], last)
+        np.testing.assert_array_equal(state.reports.bitmap[0], last)
+        np.testing.assert_array_equal(View.of(state).sees[0], awake & now)
+    assert first_ones > 3 and late_zeros > 3
+
+
+def test_presence_is_reported_in_every_period():
+    for awake, state, _ in play(scene(reports="presence"), some):
+        now = truth(state)
+        assert told(state).keys() == set(np.flatnonzero(awake & now))
+        assert {value[0] for value in told(state).values()} <= {1}
+        np.testing.assert_array_equal(state.reports.bitmap[0, awake], now[awake])
+
+
+def test_a_refresh_asks_all_who_are_awake():
+    last = np.zeros(100, bool)
+    for awake, state, _ in play(scene(refresh=4), some):
+        now, period = truth(state), state.period[0]
+        changed = awake & (now != last)
+        reporting = awake if period % 4 == 0 else changed
+        assert told(state) == {i: (now[i], changed[i]) for i in np.flatnonzero(reporting)}
+        last = np.where(awake, now, last)
+
+
+def test_a_refresh_heals_what_losses_have_spoilt():
+    """Then a bit stays wrong only if its report is lost, too; else those stay wrong that do not change."""
+    wrong, spoilt, healed = {0: [], 5: []}, 0, 0
+    for refresh, shares in wrong.items():
+        for key in range(8):
+            bitmap = np.zeros(100)
+            for _, state, _ in play(scene(refresh=refresh, packet_success=0.7, retries=0), key=key):
+                before, bitmap, now = bitmap, state.reports.bitmap[0].copy(), truth(state)
+                shares.append((bitmap != now).mean())
+                if refresh and state.period[0] % refresh == 0:
+                    spoilt += (before != now).sum()
+                    healed += ((before != now) & (bitmap == now)).sum()
+    assert abs(healed / spoilt - 0.7) < 4 * (0.7 * 0.3 / spoilt) ** 0.5 < 0.1
+    often, never = (np.reshape(wrong[refresh], (8, 30)).mean(axis=1) for refresh in (5, 0))
+    assert (often < never).all()
+
+
+def test_misread_states():
+    """Each with its probability, drawn anew for every node and period."""
+    misread = [
+        (state.sensed[0] != truth(state)) for key in range(10) for _, state, _ in play(scene(flip=0.05), key=key)
+    ]
+    n = np.size(misread)
+    assert abs(np.mean(misread) - 0.05) < 4 * (0.05 * 0.95 / n) ** 0.5
+    again = np.mean(np.array(misread)[1:] & np.array(misread)[:-1])
+    assert abs(again - 0.05**2) < 4 * (0.05**2 / n) ** 0.5
+
+
+# --- what it costs ------------------------------------------------------------------------------------------
+
+
+def test_a_report_to_the_sink_by_hand():
+    """64 bits over 30 m and 50 m to the middle of the field; who receives is on mains."""
+    scenario = scene(nodes=3, positions=((130, 100), (100, 150), (0, 0)), start_m=(115, 115), legs=((40, 0, 0),))
+    for awake, state, outcome in play(scenario):
+        first = state.period[0] == 1
+        joules = [64 * (50e-9 + 150e-12 * d**2) for d in (30, 50)] if first else [0, 0]
+        np.testing.assert_allclose(outcome.spent_j[0], [*joules, 0], rtol=1e-9, atol=1e-18)
+        assert outcome.energy_j[0, REPORT] == pytest.approx(sum(joules))
+        assert awake.all() and outcome.members[0] == 3
+
+
+def test_a_search_asks_everybody():
+    scenario = scene(start="search", wakeup_bits=128)
+    world = World(scenario, threads=1)
+    state, outcome = world.restart(world.reset([4]), np.ones(1, bool), np.array([4], np.uint64))
+    now = truth(state)
+    assert told(state).keys() == set(np.flatnonzero(now)) and outcome.members[0] == 100
+    np.testing.assert_array_equal(state.sensed[0], now)
+    np.testing.assert_array_equal(state.reports.bitmap[0], now)
+    np.testing.assert_array_equal(View.of(state).sees[0], now)
+    squared = ((state.network.positions[0, now] - 100) ** 2).sum(axis=1)
+    joules = 100 * 128 * 100e-9 + (64 * (50e-9 + 150e-12 * squared)).sum()
+    assert outcome.energy_j[0, SEARCH] == pytest.approx(joules, rel=1e-9)
+    state, _ = world.step(state, Cluster.of([0], np.ones((1, 100), bool)))
+    assert told(state).keys() == set(np.flatnonzero(truth(state) != now))
+
+
+# --- the particle filter on the bitmap ----------------------------------------------------------------------
+
+
+def cloud(width=30.0, n=500):
+    x = np.random.default_rng(0).normal(100, width, (4, n)).astype(np.float32)
+    return x, np.zeros(n, np.float32)
+
+
+@pytest.mark.parametrize("detects", [True, False])
+@pytest.mark.parametrize(
+    ("overrides", "wrong"),
+    [({}, 1e-6), (dict(flip=0.02), 0.02), (dict(packet_success=0.7, retries=0), 0.3), (dict(packet_success=0.0), 0.5)],
+)
+def test_a_state_weighs_like_plain_numpy(detects, overrides, wrong):
+    """A lost report leaves a bit as wrong as a misreading does."""
+    x, log_weights = cloud()
+    c = constants(scene(edge_m=2.0, **overrides))[0]
+    weigh_state(x, log_weights, np.array([120.0, 90.0]), detects, c)
+    distance = np.hypot(x[0].astype(float) - 120, x[2].astype(float) - 90)
+    p = wrong + (1 - 2 * wrong) / (1 + np.exp((distance - 40) / 2))
+    np.testing.assert_allclose(log_weights, np.log(p if detects else 1 - p), rtol=2e-4, atol=2e-5)
+
+
+@pytest.mark.parametrize("width", [0.5, 5.0, 30.0])
+def test_nodes_that_are_left_out_would_have_told_all_particles_the_same(width):
+    scenario = scene(particles=500)
+    *_, (awake, state, _) = play(scenario, some)
+    c = constants(scenario)[0]
+    x, log_weights = cloud(width)
+    weigh_states(x, log_weights, state.network, state.reports.bitmap[0], 0, c)
+    everyone = np.zeros(500)
+    for node in np.flatnonzero(awake):
+        one = np.zeros(500, np.float32)
+        weigh_state(x, one, state.network.positions[0, node], state.reports.bitmap[0, node] != 0, c)
+        everyone += one
+    difference = everyone - log_weights
+    np.testing.assert_allclose(difference, difference[0], atol=2e-3)
+
+
+def test_who_sleeps_or_is_dead_tells_nothing():
+    scenario = scene(particles=500)
+    *_, (awake, state, _) = play(scenario, some)
+    c, (x, ours), (_, theirs) = constants(scenario)[0], cloud(5.0), cloud(5.0)
+    weigh_states(x, ours, state.network, state.reports.bitmap[0], 0, c)
+    dead = np.flatnonzero(awake)[3:9]
+    bitmap = np.where(awake, state.reports.bitmap[0], 1 - state.reports.bitmap[0])
+    weigh_states(x, theirs, state.network, bitmap, 0, c)
+    np.testing.assert_array_equal(ours, theirs)
+    state.network.battery[0, dead] = 0.0
+    ours[:], theirs[:] = 0, 0
+    weigh_states(x, ours, state.network, bitmap, 0, c)
+    bitmap[dead] = 1 - bitmap[dead]
+    weigh_states(x, theirs, state.network, bitmap, 0, c)
+    np.testing.assert_array_equal(ours, theirs)
+
+
+# --- who can read one bit -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("overrides", "says"),
+    [
+        (
+            dict(measurement="binary", tracker="ekf"),
+            "tracker = 'ekf': cannot read Binary reports; .* position and rssi",
+        ),
+        (dict(measurement="binary", tracker="snapshot"), "tracker = 'snapshot': cannot read Binary"),
+        (dict(measurement="rssi", tracker="boundary"), "'boundary': cannot read Rssi reports; .* measurement binary"),
+        (
+            dict(measurement="binary", reports="presence", tracker="boundary_ekf"),
+            "reports = 'presence': allowed is 'ch",
+        ),
+        (dict(measurement="binary", silent_information=True), "silent_information = True: allowed is False"),
+        (dict(measurement="binary", gate_m=0), "Tracking.gate_m = 0: must be a finite number above 0"),
+    ],
+)
+def test_what_does_not_fit_together_is_refused(overrides, says):
+    with pytest.raises(ScenarioError, match=says):
+        Scenario.named("PreDC-v0", **overrides)
+
+
+def test_a_tracker_and_its_measurement_may_change_together():
+    binary = Scenario.named("Binary-v0", tracker="boundary")
+    assert binary.override(measurement="rssi", tracker="ekf").tracking.tracker == "ekf"
+    for name in BOUNDARY_TRACKERS:
+        assert Scenario.named("PreDC-v0", measurement="binary", tracker=name).binary
