@@ -6,8 +6,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from wsn_env import Cluster, Scenario, World
-from wsn_env.scenario import READS
-from wsn_env.sections import BOUNDARY_TRACKERS, MEASUREMENTS
+from wsn_env.sections import BOUNDARY_TRACKERS, MEASUREMENTS, READS
 
 TRACKERS = ("particle", "particle", "particle", "ekf", "ukf", "ickf", "snapshot", *BOUNDARY_TRACKERS)
 MOTIONS = ["crossing", "straight", "sine", "circle", "turns", "waypoint"]

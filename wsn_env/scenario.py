@@ -15,7 +15,7 @@ from wsn_env.sections import (
     MEASUREMENTS,
     MOTIONS,
     RADIOS,
-    TRACKERS,
+    READS,
     Binary,
     Crossing,
     Cruise,
@@ -28,7 +28,6 @@ from wsn_env.sections import (
     Position,
     Radio,
     Rssi,
-    RssiPower,
     Sonar,
     Threshold,
     Tracking,
@@ -46,11 +45,6 @@ KINDS = {
     "tracking": (Tracking,),
 }
 BY_NAME = {"motion": MOTIONS, "detection": DETECTIONS, "measurement": MEASUREMENTS, "radio": RADIOS}
-
-# Which measurements a tracker can read.
-READS = dict.fromkeys(TRACKERS, (Position, Rssi, RssiPower, Sonar))
-READS |= dict.fromkeys(("trilateration", "nonlinear_ls", "grnn", "grnn_kf"), (Rssi, RssiPower))
-READS |= dict.fromkeys(BOUNDARY_TRACKERS, (Binary,)) | {"particle": tuple(MEASUREMENTS.values())}
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,7 @@ import math
 import numpy as np
 
 from wsn_env.scenario import Scenario
-from wsn_env.sections import Binary, Detection, Level, Measurement, Position, Threshold
-
-RECEIVERS = ("head", "sink", "target")
+from wsn_env.sections import RECEIVERS, Binary, Detection, Level, Measurement, Position, Threshold
 
 CONSTANTS = np.dtype(
     [

@@ -11,8 +11,8 @@ import numpy as np
 
 from wsn_env import draws
 from wsn_env.compiling import lean_piece
-from wsn_env.physics.constants import RECEIVERS
 from wsn_env.physics.field import squared_distance
+from wsn_env.sections import RECEIVERS
 
 SENSING, HANDOVER, INVITATION, REPORT, BROADCAST, SEARCH = range(6)
 TO_HEAD, TO_SINK, TO_TARGET = range(len(RECEIVERS))
