@@ -7,7 +7,7 @@ from wsn_env import Cluster, Scenario, View, World
 from wsn_env.physics.constants import constants
 from wsn_env.quantity import ScenarioError
 from wsn_env.sections import BOUNDARY_TRACKERS
-from wsn_env.trackers.kernels import weigh_state, weigh_states
+from wsn_env.trackers.likelihood import weigh_state, weigh_states
 
 REPORT, SEARCH = 3, 5
 

@@ -11,7 +11,7 @@ from wsn_env.evaluation import episodes
 from wsn_env.physics.constants import constants
 from wsn_env.physics.motion import predict_moments
 from wsn_env.physics.sensing import detection_probability
-from wsn_env.trackers import kernels
+from wsn_env.trackers import kernels, likelihood
 from wsn_env.trackers.particle import ParticleTracker
 from wsn_env.types import State
 
@@ -265,8 +265,8 @@ def teller(weigh_detection, weigh_silence):
 
 
 TELLERS = {
-    "strict": teller(kernels.weigh_detection, kernels.weigh_silence),
-    "fast": teller(fast(kernels.weigh_detection), fast(kernels.weigh_silence)),
+    "strict": teller(likelihood.weigh_detection, likelihood.weigh_silence),
+    "fast": teller(fast(likelihood.weigh_detection), fast(likelihood.weigh_silence)),
 }
 
 

@@ -11,7 +11,7 @@ from wsn_env.compiling import fast
 from wsn_env.physics.constants import constants
 from wsn_env.physics.sensing import detection_probability
 from wsn_env.sections import Detection, Position, Rssi, Sonar, Threshold
-from wsn_env.trackers import kernels
+from wsn_env.trackers import likelihood
 
 UNDERWATER = Scenario.named("Underwater-v0")
 ALPHA = 1.18703e-3
@@ -91,7 +91,7 @@ def quiet(weigh_quiet):
     return tell
 
 
-@pytest.mark.parametrize("weigh", [kernels.weigh_quiet, fast(kernels.weigh_quiet)], ids=["strict", "fast"])
+@pytest.mark.parametrize("weigh", [likelihood.weigh_quiet, fast(likelihood.weigh_quiet)], ids=["strict", "fast"])
 @pytest.mark.parametrize("changes", [{}, {"noise_db": 0.2}, {"measurement": Rssi(), "threshold_db": -70.0}])
 def test_silence_weighs_like_plain_numpy(changes, weigh):
     scenario = UNDERWATER.override(**changes)

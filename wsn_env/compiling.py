@@ -27,6 +27,7 @@ SERIAL_ROWS = 8  # up to here one thread is faster than handing work out
 FAST = {"reassoc", "contract", "arcp", "nsz"}  # not nnan, ninf: infinities and NaN mean what they mean
 FAST_MODULES = (  # the filter; the world stays strict
     "wsn_env.trackers.kernels",
+    "wsn_env.trackers.likelihood",
     "wsn_env.trackers.resampling",
     "wsn_env.numerics",
     "wsn_env.draws",
