@@ -18,7 +18,19 @@ for keywords in (dict(action="menu", observation="dict", order="information"), d
 envs = gym.make_vec("wsn_env/Rssi-v0", num_envs=20, vectorization_mode="vector_entry_point", particles=60)
 envs.reset(seed=0)
 envs.step(envs.action_space.sample())
-main(["evaluate", "--episodes", "3", "--policies", "pre_dc", "random", "centroid", "nearest2", "--set", "particles=60"])
+for scenario in ("PreDC-v0", "Binary-v0", "Anchors-v0", "Underwater-v0"):
+    policies = ["pre_dc", "random", "centroid", "nearest2", "boundary", "strongest_signal"]
+    main(["evaluate", "--scenario", scenario, "--episodes", "3", "--policies", *policies, "--set", "particles=60"])
+for scenario, trackers in {
+    "Binary-v0": ("boundary", "boundary_ekf", "centroid_rls"),
+    "Anchors-v0": ("ckf", "ickf", "trilateration", "grnn_kf"),
+    "Underwater-v0": ("ekf", "ukf", "snapshot"),
+}.items():
+    for tracker in trackers:
+        kept = ["silent_information=false", "resampling=systematic"]
+        quantities = ["particles=60", "periods=4", f"tracker={tracker}", *kept]
+        main(["evaluate", "--scenario", scenario, "--episodes", "2", "--policies", "all", "--set", *quantities])
+gym.make("wsn_env/Binary-v0", order="value", particles=60, start="search").reset(seed=0)
 """
 
 

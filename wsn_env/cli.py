@@ -115,8 +115,10 @@ def run_compile(command: Compile) -> None:
             env = ClusterEnv(particles=20, periods=3, start="search", order=order, fast=fast)
             env.reset(seed=0)
             env.step(10)
-    for tracker in ("particle", "snapshot", "ickf"):
-        scenario = Scenario.named("PreDC-v0", particles=20, periods=2, tracker=tracker)
+    scenarios = [Scenario.named("PreDC-v0", tracker=tracker) for tracker in ("particle", "snapshot", "ickf")]
+    scenarios.append(Scenario.named("Binary-v0", nodes=20, tracker="boundary"))
+    scenarios.append(Scenario.named("Rssi-v0", nodes=20, tracker="grnn", field_seed=0))
+    for scenario in (scenario.override(particles=20, periods=2) for scenario in scenarios):
         for policy in ("pre_dc", "random"):
             for state, _ in episodes(make_policy(policy, scenario), World(scenario), [0]):
                 View.from_arrays(View.of(state).as_arrays())
