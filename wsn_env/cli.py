@@ -115,8 +115,9 @@ def run_compile(command: Compile) -> None:
             env = ClusterEnv(particles=20, periods=3, start="search", order=order, fast=fast)
             env.reset(seed=0)
             env.step(10)
-    for tracker in ("particle", "snapshot", "ickf"):
-        scenario = Scenario.named("PreDC-v0", particles=20, periods=2, tracker=tracker)
+    for tracker in ("particle", "snapshot", "ickf", "boundary"):
+        name = "Binary-v0" if tracker == "boundary" else "PreDC-v0"
+        scenario = Scenario.named(name, particles=20, periods=2, tracker=tracker)
         for policy in ("pre_dc", "random"):
             for state, _ in episodes(make_policy(policy, scenario), World(scenario), [0]):
                 View.from_arrays(View.of(state).as_arrays())
