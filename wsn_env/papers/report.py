@@ -45,7 +45,7 @@ class Expectation:
 
     @property
     def within(self) -> bool:
-        return abs(self.measured - self.expected) <= self.tolerance
+        return bool(abs(self.measured - self.expected) <= self.tolerance)
 
 
 @dataclass(frozen=True)

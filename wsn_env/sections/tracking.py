@@ -71,7 +71,7 @@ class Tracking(Section):
     )
     gate_m: float | None = quantity(
         None,
-        "trackers of binary sensors refuse what is off the prediction by more than this and three sds; None: nothing",
+        "boundary trackers refuse what is off the prediction by more than this and three sds; None: nothing",
         above=0,
         optional=True,
     )
