@@ -231,3 +231,30 @@ def test_a_cluster_of_another_batch_is_refused():
         talk.world.step(talk.state, Cluster(np.array([0, 0]), np.array([1, 1])))
     with pytest.raises(ValueError, match="rows"):
         talk.world.restart(talk.state, [True], [1, 2])
+
+
+def test_a_sink_hears_reports_at_the_senders_price_only():
+    talk = Talk(receiver="sink", invitation_bits=40, positions=((50, 50), (60, 50), (50, 70), (90, 80)))
+    outcome = talk.step(0, 1, 3)
+    calls = np.array([rx(40), rx(40), 0, rx(40)])
+    reports = np.array([tx(512, 0), tx(512, 10), 0, tx(512, 50)])  # from the middle of 100 m x 100 m
+    np.testing.assert_allclose(outcome.spent_j[0], calls + reports, rtol=0, atol=TINY)
+    assert outcome.delivered[0] == 3 and not outcome.handover[0]
+    outcome = talk.step(1, 0, 2)  # another leads: nothing is handed over, and who was awake need not be called
+    np.testing.assert_allclose(
+        outcome.spent_j[0], [tx(512, 0), tx(512, 10), rx(40) + tx(512, 20), 0], rtol=0, atol=TINY
+    )
+    assert not outcome.handover[0] and outcome.energy_j[0, HANDOVER] == 0
+
+
+def test_beacons_go_as_far_as_the_target_is_predicted_and_so_tell_nothing():
+    talk = Talk(receiver="target", rows=2)
+    predicted = talk.state.belief.predicted_mean.copy()
+    far = talk.state.copy()
+    far.track[:, :, 0] = 99.0
+    outcome = talk.step(0, 3)
+    for row in range(2):
+        way = np.hypot(predicted[row, 0] - 50, predicted[row, 2] - 80)
+        assert outcome.spent_j[row, 3] == near(rx(128) + tx(512, way))
+    _, elsewhere = talk.world.step(far, Cluster(np.zeros(2, int), np.full((2, 1), 3)))
+    np.testing.assert_array_equal(elsewhere.spent_j, outcome.spent_j)

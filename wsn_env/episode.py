@@ -84,6 +84,7 @@ def begin(start, stop, cs, rows, keys, motion, numbers, recordings, starts, plac
         track_stream = draws.stream(key, 0, draws.TRACK)
         draw_track(motion, numbers, recordings, track_stream, c.period_s, c.side_m, state.track[b])
         _first_belief(draws.stream(key, 0, draws.START), state.track[b, 0], s, c, belief.mean, belief.cov)
+        belief.predicted_mean[:] = belief.mean  # where a first search takes the target to be
 
 
 @piece

@@ -170,7 +170,7 @@ def _sense(node, head, purpose, target, state, outcome, b, c):
     if not has_news:
         return
     outcome.row[b].detections += 1
-    if radio.report(node, head, target, purpose, state, outcome, b, c):
+    if radio.report(node, head, purpose, state, outcome, b, c):
         slot = reports.count[b]
         reports.node[b, slot] = node
         if c.model == sensing.BINARY:

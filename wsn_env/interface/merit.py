@@ -5,7 +5,7 @@ import numpy as np
 from wsn_env.compiling import kernel, lean_piece
 from wsn_env.numerics import exp, normal_cdf
 from wsn_env.physics.field import squared_distance
-from wsn_env.physics.radio import TO_HEAD, TO_SINK, transmission
+from wsn_env.physics.radio import TO_HEAD, outside, transmission
 from wsn_env.physics.sensing import BINARY, detection_piece, strength
 
 TWO_PI = 6.283185307179586
@@ -80,17 +80,17 @@ def _edge(dx, dy, cov, c):
 
 
 @lean_piece
-def _price_mj(detection, positions, node, head, mean, cov, c):
+def _price_mj(detection, positions, node, head, mean, c):
     """Expected energy of a node's being awake for the period instead of asleep, and of its report [mJ].
 
     The report goes to the head, or as far as the prediction where the head is still open; to the sink; to the target.
     """
-    if c.receiver == TO_SINK:
-        squared = squared_distance(positions, node, 0.5 * c.side_m, 0.5 * c.side_m)
-    elif c.receiver == TO_HEAD and head >= 0:
-        squared = squared_distance(positions, node, positions[head, 0], positions[head, 1])
-    else:
-        squared = squared_distance(positions, node, mean[0], mean[2]) + cov[0, 0] + cov[2, 2]
+    x, y = mean[0], mean[2]
+    if c.receiver != TO_HEAD:
+        x, y = outside(mean, c)
+    elif head >= 0:
+        x, y = positions[head, 0], positions[head, 1]
+    squared = squared_distance(positions, node, x, y)
     report = transmission(c.report_bits, squared, c)
     if c.receiver == TO_HEAD:
         report += c.report_bits * c.rx_j_per_bit
@@ -129,7 +129,7 @@ def order_by_merit(start, stop, cs, positions, heads, beliefs, lams, nodes, orde
                     g, q00, q01, q11 = gain(detections[k], positions[b], nodes[b, k], mean, cov, p00, p01, p11, c)
                     value = np.sqrt(p00 + p11) - np.sqrt(max(p00 + p11 - g, 0.0))
                     if lams[b] > 0.0:
-                        value -= lams[b] * _price_mj(detections[k], positions[b], nodes[b, k], heads[b], mean, cov, c)
+                        value -= lams[b] * _price_mj(detections[k], positions[b], nodes[b, k], heads[b], mean, c)
                     if value > most:
                         best, most, after = k, value, (q00, q01, q11)
             if best < 0:

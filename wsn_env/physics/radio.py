@@ -74,7 +74,14 @@ def send_out(sender, x, y, bits, purpose, state, outcome, b, c):
 
 
 @lean_piece
-def report(node, head, target, purpose, state, outcome, b, c):
+def outside(mean, c):
+    """Where a receiver outside the network stands, as far as the network knows: the sink in the middle of the field,
+    the target where it is predicted. (A price of the true way would tell the target's distance through batteries.)"""
+    return (mean[0], mean[2]) if c.receiver == TO_TARGET else (0.5 * c.side_m, 0.5 * c.side_m)
+
+
+@lean_piece
+def report(node, head, purpose, state, outcome, b, c):
     """A node's report with its retries. Returns whether it was received; to the head its own is free.
 
     Beyond one hop nothing is sent: after a search the new head may lie so far, for a modem.
@@ -85,7 +92,7 @@ def report(node, head, target, purpose, state, outcome, b, c):
         if state.network.battery[b, head] <= 0.0 or node == head:
             return state.network.battery[b, head] > 0.0
     else:
-        x, y = target if c.receiver == TO_TARGET else (0.5 * c.side_m, 0.5 * c.side_m)
+        x, y = outside(state.belief.row[b].predicted_mean, c)
     if squared_distance(positions, node, x, y) > c.hop_m * c.hop_m:
         return False
     packet = draws.SEARCH_PACKET if purpose == SEARCH else draws.PACKET
