@@ -45,6 +45,11 @@ class Link(Section):
         """Probability that a report arrives within all its tries."""
         return 1 - (1 - self.packet_success) ** (1 + self.retries)
 
+    @property
+    def head_delivery(self) -> float:
+        """The same of the head's report: it hears its own, a sink or the target may not."""
+        return 1.0 if self.receiver == "head" else self.delivery
+
     def sending_j(self, bits: float, distance_m: float) -> float:
         """Energy of sending over a distance, relayed where it is beyond one hop: bits (e1 + e2 d^2) for each."""
         hops = max(1, math.ceil(distance_m / self.hop_m))
