@@ -151,8 +151,8 @@ def take_over(head, state, outcome, b, c):
 def form(head, chosen, count, state, outcome, b, c):
     """Make the chosen cluster the standing one: handover from the old head, invitations to new members.
 
-    Only members that hear their invitation join. A new head invites all. Where a sink or the target receives, it is they
-    who call, at no expense here, those that have slept.
+    Only members that hear their invitation join. A new head invites all of them. A sink or the target calls only who
+    has slept, the head like the others, and at no expense here.
 
     Args:
         head: the new head, alive.
