@@ -129,6 +129,7 @@ def test_a_battery_lasts_as_long_as_its_docstring_says():
         (dict(radio="modem", hop_m=0), "Modem.hop_m = 0: must be a finite number above 0"),
         (dict(radio="modem", bit_rate=0), "Modem.bit_rate = 0"),
         (dict(radio="modem", tx_nj_per_bit=3), "no quantity 'tx_nj_per_bit'"),
+        (dict(radio="modem", receiver="sink"), "Modem.receiver = 'sink': allowed are head"),
         (dict(radio="modern"), "did you mean modem"),
         (dict(radio="modem", period_s=0.2), "Scenario.period_s = 0.2: must be at least 0.267 s"),
         (dict(hop_m=250), "no quantity 'hop_m'"),

@@ -104,6 +104,16 @@ def test_a_handover_and_invitations_to_all():
     assert outcome.spent_j[0, 1] == near(rx(448) + tx(128, 10) + tx(128, apart) + 2 * rx(512))
 
 
+@pytest.mark.parametrize("receiver", ["sink", "target"])
+def test_a_sink_and_the_target_call_those_that_have_slept(receiver):
+    talk = Talk(receiver=receiver)
+    assert talk.step(0, 1).energy_j[0, INVITATION] == near(2 * rx(128))
+    assert talk.step(1, 0, 2).energy_j[0, INVITATION] == near(rx(128))
+    outcome = talk.step(3, 2)
+    assert outcome.energy_j[0, INVITATION] == near(rx(128))
+    assert outcome.energy_j[0, HANDOVER] == 0 and outcome.handover[0] == 0
+
+
 def test_the_head_among_the_members_and_minus_one_to_keep_it():
     talk = Talk()
     assert talk.step(0, 0, 1).members[0] == 2
@@ -149,6 +159,15 @@ def test_a_search_wakes_everybody_at_the_receivers_cost():
     assert outcome.energy_j[0].sum() == near(4 * rx(128) + reports)
     np.testing.assert_allclose(outcome.spent_j[0, 1], rx(128) + tx(512, 10), atol=TINY)
     np.testing.assert_allclose(1 - state.network.battery, outcome.spent_j, atol=TINY)
+
+
+def test_a_search_under_a_sink_calls_everybody_once():
+    talk = Talk(receiver="sink", search=True, noise_m=1e4, start_sd_m=5000)
+    outcome = talk.step(3)
+    assert outcome.searched[0] == 1 and talk.state.network.head[0] == 0
+    assert outcome.energy_j[0, INVITATION] == near(rx(128))  # node 3's, before
+    reports = sum(tx(512, d) for d in (0, 10, 20, 30))
+    assert outcome.energy_j[0, SEARCH] == near(4 * rx(128) + reports)
 
 
 def test_a_search_hands_over_from_the_old_head():

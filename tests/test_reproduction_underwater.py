@@ -17,7 +17,6 @@ from wsn_env.papers.underwater.systems import (
     hysteresis_trial,
     lost,
     resampling_trial,
-    rmse_m,
     scenario_as_read,
     threshold_trial,
 )
@@ -61,12 +60,12 @@ def test_the_improved_resampling_keeps_the_target_that_systematic_resampling_los
     systematic, spread = pair(SMOOTH, 300, "carried")
     assert lost(systematic).mean() >= 0.15
     assert lost(spread).mean() <= 0.03
-    assert abs(rmse_m(spread)[0] - 16.0) < 4 * rmse_m(spread)[1]
+    assert abs(spread.pooled_rms_m()[0] - 16.0) < 4 * spread.pooled_rms_m()[1]
     assert exceeds(systematic.rms_m(), spread.rms_m())
 
 
 def test_it_does_no_harm_to_a_rough_motion():
-    systematic, spread = (rmse_m(record)[0] for record in pair(ROUGH, 300, "carried"))
+    systematic, spread = (record.pooled_rms_m()[0] for record in pair(ROUGH, 300, "carried"))
     assert HARMLESS[0] <= spread / systematic <= HARMLESS[1]
 
 
@@ -87,7 +86,7 @@ def test_silence_lowers_the_error_at_no_energy():
 def test_hysteresis_halves_the_handovers():
     hasty, calm = (play(hysteresis_trial(db, 50)) for db in (0.0, 3.0))
     assert calm.handover.mean() < 0.6 * hasty.handover.mean()
-    assert abs(rmse_m(calm)[0] / rmse_m(hasty)[0] - 1) < 0.1
+    assert abs(calm.pooled_rms_m()[0] / hasty.pooled_rms_m()[0] - 1) < 0.1
 
 
 @pytest.mark.parametrize("noise", NOISES)

@@ -43,6 +43,7 @@ def first_search(world, state, members=()):
         ((1,), {}, 4),  # 0.16^3 = 4.1e-3, 0.16^4 = 6.6e-4
         ((1, 2), {}, 3),  # 0.064^2 = 4.1e-3, 0.064^3 = 2.6e-4
         ((1,), dict(packet_success=0.5, retries=0), 6),  # (0.4 x 0.7)^5 = 1.7e-3, ^6 = 4.8e-4
+        ((), dict(packet_success=0.5, retries=0, receiver="sink"), 20),  # 0.7^19 = 1.1e-3, 0.7^20 = 8e-4
         ((), dict(search_miss=0.05), 4),  # 0.4^3 = 0.064, 0.4^4 = 0.026
         ((), dict(ceiling=1.0), 1),  # a sure node's silence is enough
     ],

@@ -59,7 +59,7 @@ def scenarios(draw, trackers=TRACKERS, modem_hops_m=(30.0, 70.0, 250.0), **fixed
         overrides |= dict(layout="grid", nodes=isqrt(overrides["nodes"]) ** 2, jitter=draw(st.sampled_from([0.25, 0])))
     overrides |= fixed
     if draw(st.sampled_from([False, False, True])):
-        overrides |= dict(radio="modem", hop_m=draw(st.sampled_from(modem_hops_m)))
+        overrides |= dict(radio="modem", hop_m=draw(st.sampled_from(modem_hops_m)), receiver="head")
         overrides["battery_j"] *= MODEM_J
     else:
         overrides["sensing_nj"] = draw(st.sampled_from([0.0, 1500.0]))

@@ -270,7 +270,7 @@ def search(start, stop, cs, rows, found, state, outcome):
         strongest = _wake_all(state, outcome, b, c)
         if strongest >= 0:
             # The new head takes over (the velocity is handed to it) and hears the others.
-            if radio.form(strongest, state.reports.node[b], 0, state, outcome, b, c):
+            if radio.take_over(strongest, state, outcome, b, c):
                 outcome.row[b].handover = True
             outcome.row[b].detections = 0
             state.reports.count[b] = 0

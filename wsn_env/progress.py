@@ -9,8 +9,11 @@ Progress = Callable[[int, int, str], None]  # done, total, what
 
 
 @contextmanager
-def progress_bar() -> Iterator[Progress]:
-    """A bar with the time left, as a function progress(done, total, what)."""
+def progress_bar(instead: Progress | None = None) -> Iterator[Progress]:
+    """A bar with the time left, as a function progress(done, total, what); or what is given `instead` of it."""
+    if instead is not None:
+        yield instead
+        return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
     from rich.progress import Progress as Bar

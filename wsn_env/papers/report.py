@@ -56,6 +56,11 @@ class Sheet:
     rows: list[Sequence[Any]]
 
 
+def by_period(names: Iterable[str], columns: Iterable[Sequence[float]], clock: str = "period") -> Sheet:
+    """A table of a row a period, counted from 1 in its first column, `clock`."""
+    return Sheet((clock, *names), [(k + 1, *values) for k, values in enumerate(zip(*columns, strict=True))])
+
+
 def verdict(plainly: bool, under_reading: bool) -> str:
     """Judge a claim.
 
@@ -88,6 +93,15 @@ def write_sheet(path: Path, sheet: Sheet) -> None:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(sheet.columns)
         table.writerows([_cell(value) for value in row] for row in sheet.rows)
+
+
+def conclude(out: Path, claims: Sequence[Claim], expected: Sequence[Expectation]) -> None:
+    """Write claims.csv and expected.csv to the folder and print both, after all else."""
+    write_claims(out / "claims.csv", claims)
+    write_expected(out / "expected.csv", expected)
+    print_claims(claims)
+    print_expected(expected)
+    print(f"written: {out}")
 
 
 def write_claims(path: Path, claims: Iterable[Claim]) -> None:
@@ -139,6 +153,12 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
     for row in rows:
         table.add_row(*map(escape, row))
     wide_console().print(table)
+
+
+def print_sheet(title: str, sheet: Sheet, caption: str | None = None) -> None:
+    """A sheet on the terminal, numbers with four digits."""
+    rows = [["-" if v is None else f"{v:.4g}" if isinstance(v, float) else str(v) for v in row] for row in sheet.rows]
+    print_table(title, sheet.columns, rows, caption)
 
 
 def print_claims(claims: Iterable[Claim]) -> None:

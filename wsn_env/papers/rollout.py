@@ -81,9 +81,7 @@ class Record:
 
     def pooled_rms_m(self, axis: int | None = None) -> tuple[float, float]:
         """Root of the mean square error over all runs and periods, along an axis or both, and its standard error."""
-        square = (self.offset_m**2).sum(axis=2) if axis is None else self.offset_m[:, :, axis] ** 2
-        rms = float(np.sqrt(square.mean()))
-        return rms, standard_error(square.mean(axis=1)) / (2 * rms)
+        return pooled_rms(self.square_error() if axis is None else self.offset_m[:, :, axis] ** 2)
 
     def rms_per_period_m(self, heard_only: bool = False) -> np.ndarray:
         """(K,) root of the mean square error over the runs; NaN where no run counts."""
@@ -132,6 +130,12 @@ def _play_block(world: World, policy, runs: range, tick) -> tuple[np.ndarray, ..
 def standard_error(values: np.ndarray) -> float:
     """Of the mean over runs."""
     return float(np.std(values, ddof=1) / np.sqrt(len(values)))
+
+
+def pooled_rms(square: np.ndarray) -> tuple[float, float]:
+    """Root of the mean of squares (R, K), and its standard error over the runs (by the delta method)."""
+    rms = float(np.sqrt(square.mean()))
+    return rms, standard_error(square.mean(axis=1)) / (2 * rms)
 
 
 def exceeds(larger: np.ndarray, smaller: np.ndarray) -> bool:

@@ -46,6 +46,7 @@ CONSTANTS = np.dtype(
         ("packet_success", "f8"),
         ("tries", "i8"),
         ("delivery", "f8"),
+        ("head_delivery", "f8"),
         ("receiver", "i8"),  # its place in RECEIVERS
         ("awake_j", "f8"),  # a node's period, packets apart
         ("asleep_j", "f8"),
@@ -84,6 +85,7 @@ def constants(scenario: Scenario) -> np.ndarray:
         packet_success=r.packet_success,
         tries=1 + r.retries,
         delivery=r.delivery,
+        head_delivery=r.head_delivery,
         receiver=RECEIVERS.index(r.receiver),
         awake_j=r.awake_j(scenario.period_s),
         asleep_j=r.asleep_j(scenario.period_s),

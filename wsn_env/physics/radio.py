@@ -144,11 +144,22 @@ def _hand_over(old, head, state, outcome, b, c):
 
 
 @lean_piece
+def take_over(head, state, outcome, b, c):
+    """An awake node leads, alone as yet. Returns whether the head's role was handed over: a sink or the target needs no
+    head, so that the node is one like the others there."""
+    standing = state.network.row[b]
+    old = standing.head
+    standing.head = head
+    standing.n_members = 0
+    return c.receiver == TO_HEAD and old >= 0 and old != head and _hand_over(old, head, state, outcome, b, c)
+
+
+@lean_piece
 def form(head, chosen, count, state, outcome, b, c):
     """Make the chosen cluster the standing one: handover from the old head, invitations to new members.
 
-    Only members that hear their invitation join. Where a sink or the target receives, the head is a node like the
-    others: nothing is handed over, and who was awake before need not be called.
+    Only members that hear their invitation join. A new head invites all of them. A sink or the target calls only who
+    has slept, the head like the others, and at no expense here.
 
     Args:
         head: the new head, alive.
@@ -158,47 +169,28 @@ def form(head, chosen, count, state, outcome, b, c):
     """
     standing, members = state.network.row[b], state.network.members[b]
     old, old_count = standing.head, standing.n_members
-    changed = old != head
-    if c.receiver != TO_HEAD:
-        return _call(head, chosen, count, state, outcome, b, c)
-    handed = changed and old >= 0 and _hand_over(old, head, state, outcome, b, c)
-    n, j = 0, 0
-    for k in range(count):
-        node = chosen[k]
-        while j < old_count and members[j] < node:
-            j += 1
-        stands = not changed and j < old_count and members[j] == node
-        if stands or send(head, node, c.invitation_bits, INVITATION, state, outcome, b, c):
-            chosen[n] = node  # n <= k: what is overwritten has been read
-            n += 1
-    for k in range(n):
-        members[k] = chosen[k]
-    standing.head = head
-    standing.n_members = n
-    return handed
-
-
-@lean_piece
-def _call(head, chosen, count, state, outcome, b, c):
-    """`form` where a sink or the target receives. Returns False: no role changes hands."""
-    standing, members = state.network.row[b], state.network.members[b]
-    old, old_count = standing.head, standing.n_members
+    heads_call = c.receiver == TO_HEAD
+    handed = take_over(head, state, outcome, b, c)
     price = c.invitation_bits * c.rx_j_per_bit
-    slept = head != old
+    called = not heads_call and head != old
     for k in range(old_count):
-        slept &= members[k] != head
-    if slept:
+        called &= members[k] != head
+    if called:
         spend(head, price, INVITATION, state, outcome, b)
     n, j = 0, 0
     for k in range(count):
         node = chosen[k]
         while j < old_count and members[j] < node:
             j += 1
-        if node == old or (j < old_count and members[j] == node) or spend(node, price, INVITATION, state, outcome, b):
-            chosen[n] = node
+        awake = node == old or (j < old_count and members[j] == node)
+        if heads_call:
+            joins = (awake and head == old) or send(head, node, c.invitation_bits, INVITATION, state, outcome, b, c)
+        else:
+            joins = awake or spend(node, price, INVITATION, state, outcome, b)
+        if joins:
+            chosen[n] = node  # n <= k: what is overwritten has been read
             n += 1
     for k in range(n):
         members[k] = chosen[k]
-    standing.head = head
     standing.n_members = n
-    return False
+    return handed

@@ -173,8 +173,8 @@ def log_miss_probability(mean, cov, positions, nodes, count, head, c):
 
     Args:
         mean, cov: (4,), (4, 4) the belief about this period before its reports.
-        nodes, count: the members, whose reports may be lost on the way.
-        head: -1: nobody is awake; its own report is always heard.
+        nodes, count: the members.
+        head: -1: nobody is awake.
     """
     a = np.sqrt(max(cov[0, 0], 1e-12))
     b = cov[0, 2] / a
@@ -187,7 +187,8 @@ def log_miss_probability(mean, cov, positions, nodes, count, head, c):
             x, y = mean[0] + a * u, mean[2] + b * u + d * v
             missed = 1.0
             if head >= 0:
-                missed = 1.0 - detection_piece(np.sqrt(squared_distance(positions, head, x, y)), c)
+                distance = np.sqrt(squared_distance(positions, head, x, y))
+                missed = 1.0 - c.head_delivery * detection_piece(distance, c)
             for k in range(count):
                 distance = np.sqrt(squared_distance(positions, nodes[k], x, y))
                 missed *= 1.0 - c.delivery * detection_piece(distance, c)

@@ -45,6 +45,11 @@ class Link(Section):
         """Probability that a report arrives within all its tries."""
         return 1 - (1 - self.packet_success) ** (1 + self.retries)
 
+    @property
+    def head_delivery(self) -> float:
+        """The same of the head's report: it hears its own, a sink or the target may not."""
+        return 1.0 if self.receiver == "head" else self.delivery
+
     def sending_j(self, bits: float, distance_m: float) -> float:
         """Energy of sending over a distance, relayed where it is beyond one hop: bits (e1 + e2 d^2) for each."""
         hops = max(1, math.ceil(distance_m / self.hop_m))
@@ -99,8 +104,9 @@ class Modem(Link):
     The powers and the rate are those of Newcastle University's Nanomodem V3. A packet of b bits takes b / rate seconds,
     so that the power of sending and of receiving is an energy per bit, whatever the distance. A node beyond one hop of
     the head cannot be its member nor report to it; a handover farther than that is relayed, at the old head's
-    expense. An awake node listens for the whole period; a node that a search wakes has paid for its sleep already.
-    Listening and sleeping are charged as sensing.
+    expense. Only a head may receive: a sink or the target would be beyond one hop of many nodes, whose silence would
+    be taken for a target that is far from them. An awake node listens for the whole period; a node that a search wakes
+    has paid for its sleep already. Listening and sleeping are charged as sensing.
 
     50 kJ, about four alkaline AA cells, are 46 days of listening or eight years of sleep; the 64 nodes of Underwater-v0
     together last for three months of tracking by the strongest signal (2.1 J a period).
@@ -111,6 +117,7 @@ class Modem(Link):
     listen_w: float = quantity(0.0125, "power of an awake node", at_least=0)
     sleep_w: float = quantity(0.0002, "power of a sleeping node", at_least=0)
     bit_rate: float = quantity(640.0, "bits a second", above=0)
+    receiver: str = quantity("head", "who hears the awake nodes: the cluster's head", choices=("head",))
     hop_m: float = quantity(250.0, "range of a transmission", above=0)
     sound_ms: float = quantity(1500.0, "speed of sound", above=0)
     report_bits: int = quantity(64, "a member's report", at_least=0, whole=True)

@@ -59,7 +59,7 @@ def weigh(x, log_weights, first, step, position, value, c):
 def weigh_awake(x, log_weights, network, nodes, b, c):
     """Add what it tells that of the awake nodes of row b just `nodes` (m,) reported, beside what they measured.
 
-    The head's own report is always heard, a member's with probability `delivery`. A node without energy tells nothing.
+    A report is heard with probability `delivery`, the head's with `head_delivery`. A node without energy tells nothing.
     """
     positions, battery, standing = network.positions[b], network.battery[b], network.row[b]
     if standing.head < 0:
@@ -69,7 +69,7 @@ def weigh_awake(x, log_weights, network, nodes, b, c):
         reported = False
         for other in nodes:
             reported |= other == node
-        delivery = 1.0 if k < 0 else c.delivery
+        delivery = c.head_delivery if k < 0 else c.delivery
         if c.detection == 1:  # a report's value tells all; that it came adds nothing
             if not reported and battery[node] > 0.0:
                 weigh_quiet(x, log_weights, positions[node], delivery, c)
@@ -96,7 +96,7 @@ def weigh_silence(x, log_weights, position, delivery, c):
     """Add log(1 - delivery p(d)): the node at `position` was awake and nothing was heard of it.
 
     Args:
-        delivery: probability that a report of the node arrives; 1 for the head.
+        delivery: probability that a report of the node arrives.
     """
     px, py = x[0], x[2]
     sx, sy = F(position[0]), F(position[1])
@@ -175,7 +175,7 @@ def weigh_quiet(x, log_weights, position, delivery, c):
         ln(1 - delivery + delivery Phi(...))             else: or the report was lost
 
     Args:
-        delivery: probability that a report of the node arrives; 1 for the head.
+        delivery: probability that a report of the node arrives.
     """
     px, py = x[0], x[2]
     sx, sy = F(position[0]), F(position[1])

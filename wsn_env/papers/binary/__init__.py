@@ -26,35 +26,25 @@ price of every node's report.
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from pathlib import Path
 
 from wsn_env.papers import report
 from wsn_env.papers.binary import figures
 from wsn_env.papers.binary.claims import Study, claims, expected
 from wsn_env.papers.binary.systems import play_paper
-from wsn_env.papers.report import Sheet
 from wsn_env.progress import Progress, progress_bar
 
 
 def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
     """Play the paper's experiments, write every file to `out` and print tables, claims and expected figures."""
     report.prepare(out)
-    with progress_bar() if progress is None else nullcontext(progress) as show:
+    with progress_bar(progress) as show:
         results = play_paper(runs, show)
     study = Study(results)
     judged, known = claims(study), expected(study)
     figures.write(out, study)
-    report.write_claims(out / "claims.csv", judged)
-    report.write_expected(out / "expected.csv", known)
-    _print("Systems", figures.systems(results), f"{runs} runs, 15 to 40 s")
-    _print("Readings", figures.readings(study), "fixes with the true velocity, well conditioned")
-    _print("Faults", figures.faults(results), "flip: misread states; packet_success: of the only try of a report")
-    report.print_claims(judged)
-    report.print_expected(known)
-    print(f"written: {out}")
-
-
-def _print(title: str, sheet: Sheet, caption: str) -> None:
-    rows = [["-" if v is None else v if isinstance(v, str) else f"{v:.4g}" for v in row] for row in sheet.rows]
-    report.print_table(title, sheet.columns, rows, caption)
+    report.print_sheet("Systems", figures.systems(results), f"{runs} runs, 15 to 40 s")
+    report.print_sheet("Readings", figures.readings(study), "fixes with the true velocity, well conditioned")
+    caption = "flip: misread states; packet_success: of the only try of a report"
+    report.print_sheet("Faults", figures.faults(results), caption)
+    report.conclude(out, judged, known)

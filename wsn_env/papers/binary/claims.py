@@ -23,7 +23,7 @@ from wsn_env.papers.binary.readings import (
 )
 from wsn_env.papers.binary.systems import FLIP, NODES, PERIODS_S, RADII_M, Results, Setting
 from wsn_env.papers.report import HOLDS, NOT_REPRODUCED, Claim, Expectation, verdict
-from wsn_env.papers.rollout import exceeds, keeps_falling, standard_error
+from wsn_env.papers.rollout import exceeds, keeps_falling, pooled_rms, standard_error
 
 DOUBT = 4.0  # standard errors that a figure of a sweep may be off
 CROSSING_S = 3.5  # the paper's
@@ -110,7 +110,8 @@ def _defaults(results: Results) -> Iterator[Expectation]:
     particle = Setting("particle", flip=FLIP)
     yield Expectation("rms error [m] of particle with flips", 1.15, 0.25, results.rms_m(particle))
     for name, value in FLIPPED_RMS_M.items():
-        yield _with_doubt(f"rms error [m] of {name} with flips", value, *_rms(results, Setting(name, flip=FLIP)))
+        measured = pooled_rms(results.error_m(Setting(name, flip=FLIP)) ** 2)
+        yield _with_doubt(f"rms error [m] of {name} with flips", value, *measured)
 
 
 def _sweeps(results: Results) -> Iterator[Expectation]:
@@ -132,12 +133,6 @@ def _readings(study: Study) -> Iterator[Expectation]:
     for name, value in SHIFT_BIAS_M.items():
         yield _with_doubt(f"bias [m] along the track, shift {name}", value, *study.bias_m(name))
     yield Expectation("rms error [m] with eqs. 12-13 as printed", 192.0, 4.0, study.printed_rms_m())
-
-
-def _rms(results: Results, setting: Setting) -> tuple[float, float]:
-    square = results.error_m(setting) ** 2
-    rms = float(np.sqrt(square.mean()))
-    return rms, standard_error(square.mean(axis=1)) / (2 * rms)
 
 
 def _with_doubt(quantity: str, value: float, measured: float, error: float) -> Expectation:

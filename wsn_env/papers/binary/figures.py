@@ -9,16 +9,16 @@ import numpy as np
 from wsn_env.papers.binary.claims import Study
 from wsn_env.papers.binary.readings import boundary_nodes, detecting_nodes
 from wsn_env.papers.binary.systems import FAULTS, NODES, PERIODS_S, RADII_M, SWEPT, SYSTEMS, Results, Setting
-from wsn_env.papers.report import Sheet, new_axes, write_picture, write_sheet
+from wsn_env.papers.colours import BLACK, BLUE, GREEN, GREY, PURPLE, VERMILION
+from wsn_env.papers.report import Sheet, by_period, new_axes, write_picture, write_sheet
 
-# Okabe and Ito's colours, which colour-blind readers tell apart; a system keeps its look in every figure.
 LOOKS = {
-    "centroid": ("centroid", dict(color="#D55E00", linestyle="--")),
-    "raw": ("fix, v given", dict(color="#999999", linestyle=":")),
-    "paper": ("paper's filter", dict(color="#000000", linestyle="-")),
-    "mid": ("mid-period fix", dict(color="#0072B2", linestyle="-.")),
-    "ekf": ("EKF of ranges", dict(color="#009E73", linestyle="-")),
-    "particle": ("particle filter", dict(color="#CC79A7", linestyle="--")),
+    "centroid": ("centroid", dict(color=VERMILION, linestyle="--")),
+    "raw": ("fix, v given", dict(color=GREY, linestyle=":")),
+    "paper": ("paper's filter", dict(color=BLACK, linestyle="-")),
+    "mid": ("mid-period fix", dict(color=BLUE, linestyle="-.")),
+    "ekf": ("EKF of ranges", dict(color=GREEN, linestyle="-")),
+    "particle": ("particle filter", dict(color=PURPLE, linestyle="--")),
 }
 SWEEPS = {  # file: field of a setting, its values, label
     "nodes": ("nodes", NODES, "number of nodes N"),
@@ -72,8 +72,7 @@ def error_over_time(results: Results) -> Sheet:
         setting = Setting(name)
         error = np.sqrt(results.records[setting].square_error()).mean(axis=0)
         columns.append(np.concatenate([np.full(round(setting.begin_s), np.nan), error]))
-    rows = [(k + 1, *values) for k, values in enumerate(zip(*columns, strict=True))]
-    return Sheet(("time_s", *(f"{name}_m" for name in LOOKS)), rows)
+    return by_period([f"{name}_m" for name in LOOKS], columns, "time_s")
 
 
 def sweep(results: Results, name: str) -> Sheet:

@@ -28,7 +28,6 @@ a biased estimate better than any unbiased one.
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from pathlib import Path
 
 from wsn_env.papers import report
@@ -54,7 +53,7 @@ from wsn_env.trackers.fingerprint import training_of
 def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
     """Play every comparison, write every file to `out` and print tables, claims and expected figures."""
     report.prepare(out)
-    with progress_bar() if progress is None else nullcontext(progress) as show:
+    with progress_bar(progress) as show:
         results = play_paper(runs, show)
     widths = {search: training_of(scenario_as_read("grnn")).best_width(search) for search in ("golden", "foa")}
     sheets = {
@@ -71,12 +70,8 @@ def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
         report.write_sheet(out / f"{name}.csv", sheet)
     figures.write(out, results)
     judged, known = claims(results, widths), expected(results, widths)
-    report.write_claims(out / "claims.csv", judged)
-    report.write_expected(out / "expected.csv", known)
     _print(sheets, runs)
-    report.print_claims(judged)
-    report.print_expected(known)
-    print(f"written: {out}")
+    report.conclude(out, judged, known)
 
 
 def rmse(results: Results) -> Sheet:
@@ -118,5 +113,4 @@ def _print(sheets: dict[str, Sheet], runs: int) -> None:
         "pitfalls": "How not to evaluate",
     }
     for name, title in titles.items():
-        rows = [[f"{v:.2f}" if isinstance(v, float) else str(v) for v in row] for row in sheets[name].rows]
-        report.print_table(title, sheets[name].columns, rows)
+        report.print_sheet(title, sheets[name])

@@ -6,17 +6,17 @@ from pathlib import Path
 
 import numpy as np
 
+from wsn_env.papers.colours import BLACK, BLUE, GREEN, GREY, PURPLE, SKY, VERMILION
 from wsn_env.papers.grnn.systems import ANCHORS, EQUAL_INFORMATION, METHODS, PERIODS_S, STARTED, Results
 from wsn_env.papers.report import Sheet, new_axes, write_picture, write_sheet
 
-# Okabe and Ito's colours, which colour-blind readers tell apart; a method keeps its colour in every picture.
 LOOKS = {
-    "nonlinear_ls": dict(color="#999999", linestyle=":"),
-    "grnn": dict(color="#D55E00", linestyle="--"),
-    "grnn_kf": dict(color="#009E73", linestyle="-"),
-    "ekf": dict(color="#56B4E9", linestyle="-."),
-    "ckf": dict(color="#0072B2", linestyle="-."),
-    "ickf": dict(color="#000000", linestyle="-"),
+    "nonlinear_ls": dict(color=GREY, linestyle=":"),
+    "grnn": dict(color=VERMILION, linestyle="--"),
+    "grnn_kf": dict(color=GREEN, linestyle="-"),
+    "ekf": dict(color=SKY, linestyle="-."),
+    "ckf": dict(color=BLUE, linestyle="-."),
+    "ickf": dict(color=BLACK, linestyle="-"),
 }
 TRACKED_S = 0.5
 
@@ -60,7 +60,7 @@ def draw_periods(results: Results):
         rms = [results.equal_information(method, t).pooled_rms_m()[0] for t in PERIODS_S]
         look = LOOKS[method] | dict(linestyle=(0, (1, 2)))
         axes.plot(PERIODS_S, rms, marker="s", markersize=3, label=f"{METHODS[method]}, √(1 s / T) dB", **look)
-    axes.axhline(results.bound_m["ring8"], color="#CC79A7", linewidth=1, label="Cramér-Rao bound, one period")
+    axes.axhline(results.bound_m["ring8"], color=PURPLE, linewidth=1, label="Cramér-Rao bound, one period")
     axes.set_xscale("log")
     axes.set_xticks(PERIODS_S, [f"{t:g}" for t in PERIODS_S])
     axes.minorticks_off()
@@ -90,9 +90,9 @@ def draw_track(sheet: Sheet):
     figure, axes = new_axes("GRNN fixes and their Kalman filter, T = 0.5 s, one run", "x [m]", "y [m]")
     figure.set_size_inches(5.6, 5.6)
     _, *columns = (np.array(column) for column in zip(*sheet.rows, strict=True))
-    axes.plot(*columns[:2], color="#999999", linewidth=3, label="target")
-    axes.plot(*columns[2:4], ".", color="#D55E00", markersize=4, label=METHODS["grnn"])
-    axes.plot(*columns[4:], color="#009E73", linewidth=1.3, label=METHODS["grnn_kf"])
+    axes.plot(*columns[:2], color=GREY, linewidth=3, label="target")
+    axes.plot(*columns[2:4], ".", color=VERMILION, markersize=4, label=METHODS["grnn"])
+    axes.plot(*columns[4:], color=GREEN, linewidth=1.3, label=METHODS["grnn_kf"])
     axes.plot(*zip(*ANCHORS["ring8"]), "k^", markersize=7, label="anchors", clip_on=False)
     axes.set(xlim=(0, 200), ylim=(0, 200), aspect="equal")
     axes.legend(frameon=False, ncols=2, loc="lower right")

@@ -12,7 +12,7 @@ from wsn_env.papers.rollout import Record, Trial, play_all
 from wsn_env.physics.field import fixed_positions
 from wsn_env.physics.sensing import strength_slopes
 from wsn_env.progress import Progress
-from wsn_env.scenario import Scenario
+from wsn_env.scenario import RING_OF_EIGHT, Scenario
 from wsn_env.sections import Detection, Legs, Rssi
 from wsn_env.world import World
 
@@ -30,10 +30,9 @@ METHODS = {  # tracker: what it is called
 FILTERS = ("grnn_kf", "ekf", "ukf", "ckf", "ickf")
 EQUAL_INFORMATION = ("grnn_kf", "ckf", "ickf")
 STARTED, STARTS = ("ekf", "ckf", "ickf"), ("field", "fix")  # filters compared over starts
-_EDGE = (0.0, 100.0, 200.0)
 _CORNERS = ((0.0, 0.0), (200.0, 0.0), (0.0, 200.0), (200.0, 200.0))
 ANCHORS = {
-    "ring8": tuple((x, y) for y in _EDGE for x in _EDGE if (x, y) != (100.0, 100.0)),
+    "ring8": RING_OF_EIGHT,
     "mix8": _CORNERS + ((60.0, 60.0), (140.0, 60.0), (60.0, 140.0), (140.0, 140.0)),
 }
 PATH = Legs(start_m=(20.0, 15.0), legs=((12.5, 10, 5), (12.5, 2, 6), (12.5, -8, 2), (12.5, -3, -9)))

@@ -34,7 +34,6 @@ lost. The diagonal needs neither.
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from pathlib import Path
 
 from wsn_env.papers import report
@@ -49,19 +48,15 @@ from wsn_env.progress import Progress, progress_bar
 def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
     """Play the paper's experiments, write every file to `out` and print both tables, claims and expected figures."""
     report.prepare(out)
-    with progress_bar() if progress is None else nullcontext(progress) as show:
+    with progress_bar(progress) as show:
         results = play_paper(runs, show)
     table, same = table2(results), same_tracker(results)
     judged, known = claims(results), expected(results)
     report.write_sheet(out / "table2.csv", table)
     report.write_sheet(out / "same_tracker.csv", same)
     figures.write(out, results)
-    report.write_claims(out / "claims.csv", judged)
-    report.write_expected(out / "expected.csv", known)
     _print(table, same, runs)
-    report.print_claims(judged)
-    report.print_expected(known)
-    print(f"written: {out}")
+    report.conclude(out, judged, known)
 
 
 def table2(results: Results) -> Sheet:

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
+from wsn_env.papers.colours import BLACK, BLUE, GREEN, GREY, VERMILION
 from wsn_env.papers.pre_dc.systems import MOTIONS, PARTICLES, SYSTEMS, Results
-from wsn_env.papers.report import Sheet, new_axes, tidy, write_picture, write_sheet
+from wsn_env.papers.report import Sheet, by_period, new_axes, tidy, write_picture, write_sheet
 from wsn_env.papers.rollout import standard_error
 from wsn_env.physics.sensing import detection_probability
 from wsn_env.sections import Detection
 
-# Okabe and Ito's colours, which colour-blind readers tell apart; a system keeps its colour in every figure.
-STATIC, EKF, PRE_DC, GREEN, GREY = "#D55E00", "#0072B2", "#000000", "#009E73", "#999999"
+STATIC, EKF, PRE_DC = VERMILION, BLUE, BLACK
 LOOKS = {  # system: label, style of its line
     "static": ("static-cluster", dict(color=STATIC, linestyle="--")),
     "ekf": ("EKF, 2 nodes", dict(color=EKF, linestyle="-.")),
@@ -66,7 +66,7 @@ def detection_curve(detection: Detection) -> Sheet:
 def error_per_period(results: Results) -> Sheet:
     """Fig. 3: RMS over the runs in each period, of the systems of Table 2 at 225 nodes."""
     columns = [results.system(name).rms_per_period_m(SYSTEMS[name].heard_only) for name in LOOKS]
-    return _by_period([f"{name}_rms_m" for name in LOOKS], columns)
+    return by_period([f"{name}_rms_m" for name in LOOKS], columns)
 
 
 def energy_per_period(results: Results) -> Sheet:
@@ -74,7 +74,7 @@ def energy_per_period(results: Results) -> Sheet:
     static = results.system("static")
     columns = [static.report_mj, static.energy_mj, results.system("ekf").energy_mj, results.system("pre_dc").energy_mj]
     names = ("static_reports_mj", "static_total_mj", "ekf_mj", "pre_dc_mj")
-    return _by_period(names, [energy.mean(axis=0) for energy in columns])
+    return by_period(names, [energy.mean(axis=0) for energy in columns])
 
 
 def tracks(results: Results) -> Sheet:
@@ -90,7 +90,7 @@ def tracks(results: Results) -> Sheet:
 def error_on_tracks(results: Results) -> Sheet:
     """Fig. 6: RMS over the runs in each period on those tracks."""
     columns = [results.motion(motion).rms_per_period_m() for motion in MOTIONS]
-    return _by_period([f"{motion}_rms_m" for motion in MOTIONS], columns)
+    return by_period([f"{motion}_rms_m" for motion in MOTIONS], columns)
 
 
 def error_of_particles(results: Results, axis: int) -> Sheet:
@@ -100,11 +100,6 @@ def error_of_particles(results: Results, axis: int) -> Sheet:
         errors = results.particles(count).axis_rms_m(axis)
         rows.append((count, errors.mean(), standard_error(errors), len(errors)))
     return Sheet(("particles", f"rms_{'xy'[axis]}_m", "stderr_m", "runs"), rows)
-
-
-def _by_period(names, columns) -> Sheet:
-    rows = [(k + 1, *values) for k, values in enumerate(zip(*columns, strict=True))]
-    return Sheet(("period", *names), rows)
 
 
 # --- figures as pictures ------------------------------------------------------------------------------------

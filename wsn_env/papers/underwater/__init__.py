@@ -24,11 +24,9 @@ period. Sleeping costs are with sensing.
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from pathlib import Path
 
 from wsn_env.papers import report
-from wsn_env.papers.report import Sheet
 from wsn_env.papers.underwater import figures
 from wsn_env.papers.underwater.claims import claims, expected
 from wsn_env.papers.underwater.systems import play_system
@@ -38,20 +36,11 @@ from wsn_env.progress import Progress, progress_bar
 def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
     """Play the experiments, write every file to `out` and print tables, claims and expected figures."""
     report.prepare(out)
-    with progress_bar() if progress is None else nullcontext(progress) as show:
+    with progress_bar(progress) as show:
         results = play_system(runs, show)
     judged, known = claims(results), expected(results)
     figures.write(out, results)
-    report.write_claims(out / "claims.csv", judged)
-    report.write_expected(out / "expected.csv", known)
-    _print("Resampling", figures.resampling(results))
-    _print("Thresholds", figures.thresholds(results))
-    _print("Hysteresis of the head", figures.hysteresis(results))
-    report.print_claims(judged)
-    report.print_expected(known)
-    print(f"written: {out}")
-
-
-def _print(title: str, sheet: Sheet) -> None:
-    rows = [[f"{value:.4g}" if isinstance(value, float) else str(value) for value in row] for row in sheet.rows]
-    report.print_table(title, sheet.columns, rows)
+    report.print_sheet("Resampling", figures.resampling(results))
+    report.print_sheet("Thresholds", figures.thresholds(results))
+    report.print_sheet("Hysteresis of the head", figures.hysteresis(results))
+    report.conclude(out, judged, known)

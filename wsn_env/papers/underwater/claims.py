@@ -23,7 +23,6 @@ from wsn_env.papers.underwater.systems import (
     Results,
     lost,
     median_rms_m,
-    rmse_m,
 )
 from wsn_env.physics.acoustics import absorption_db_per_km
 from wsn_env.scenario import Scenario
@@ -84,7 +83,7 @@ def expected(results: Results) -> list[Expectation]:
         for record, share, what in zip(_pair(results, *cell), shares, _names(*cell), strict=True):
             tolerance = max(KEEPS, MET * sqrt(share * (1 - share) / results.runs))
             figures.append(Expectation(f"share lost: {what}", share, tolerance, float(lost(record).mean())))
-    for statistic, table, measure in (("RMSE", RMSE_M, rmse_m), ("median RMS", MEDIAN_M, median_rms_m)):
+    for statistic, table, measure in (("RMSE", RMSE_M, Record.pooled_rms_m), ("median RMS", MEDIAN_M, median_rms_m)):
         for cell, metres in table.items():
             for record, value, what in zip(_pair(results, *cell), metres, _names(*cell), strict=True):
                 figures.append(_error(f"{statistic} [m]: {what}", value, *measure(record)))
@@ -96,7 +95,7 @@ def expected(results: Results) -> list[Expectation]:
     )
     for (threshold_db, silent), rmse in THRESHOLD.items():
         what = f"RMSE [m] at {threshold_db:g} dB, silence {'told' if silent else 'ignored'}"
-        figures.append(_error(what, rmse, *rmse_m(results.threshold(threshold_db, silent))))
+        figures.append(_error(what, rmse, *results.threshold(threshold_db, silent).pooled_rms_m()))
     hasty, calm = (results.hysteresis(db) for db in (0.0, 3.0))
     ratio = float(calm.handover.mean() / hasty.handover.mean())
     figures.append(Expectation("handovers with 3 dB of hysteresis over those without", 0.5, 0.1, ratio))
@@ -139,11 +138,11 @@ def _pair(results: Results, noise: float, particles: int, handover: str) -> list
 
 def _rmse_ratio(results: Results, noise: float, particles: int, handover: str) -> float:
     systematic, spread = _pair(results, noise, particles, handover)
-    return rmse_m(spread)[0] / rmse_m(systematic)[0]
+    return spread.pooled_rms_m()[0] / systematic.pooled_rms_m()[0]
 
 
 def _told(record: Record) -> str:
-    return f"{rmse_m(record)[0]:.1f} m, {100 * lost(record).mean():.0f} % lost"
+    return f"{record.pooled_rms_m()[0]:.1f} m, {100 * lost(record).mean():.0f} % lost"
 
 
 def _keeps_the_target(results: Results) -> Claim:
@@ -203,9 +202,8 @@ def _silence(results: Results) -> Claim:
         deaf, aware = (results.threshold(threshold_db, silent) for silent in (False, True))
         good.append(exceeds(deaf.rms_m(), aware.rms_m()))
         spent = aware.energy_mj.mean() / deaf.energy_mj.mean()
-        parts.append(
-            f"{threshold_db:g} dB {rmse_m(deaf)[0]:.2f} -> {rmse_m(aware)[0]:.2f} m for {spent:.2f} of the energy"
-        )
+        errors = f"{deaf.pooled_rms_m()[0]:.2f} -> {aware.pooled_rms_m()[0]:.2f} m"
+        parts.append(f"{threshold_db:g} dB {errors} for {spent:.2f} of the energy")
     what = "That a member kept silent is information: the error falls at no energy"
     return Claim(what, "-", "; ".join(parts), verdict(all(good), good[1]))
 
@@ -213,7 +211,7 @@ def _silence(results: Results) -> Claim:
 def _thresholds_save(results: Results) -> Claim:
     low, high = (results.threshold(db, True) for db in (80.0, KNEE_DB))
     saved = 1 - high.energy_mj.mean() / low.energy_mj.mean()
-    worse = rmse_m(high)[0] / rmse_m(low)[0] - 1
+    worse = high.pooled_rms_m()[0] / low.pooled_rms_m()[0] - 1
     good = bool(saved > 0.2 and worse < 0.2)
     ours = f"from 80 to {KNEE_DB:g} dB {100 * saved:.0f} % less energy for an error {100 * worse:.0f} % larger"
     what = "A threshold on reports saves energy at little loss"
@@ -224,7 +222,7 @@ def knee_db(results: Results) -> float:
     """Threshold of the point farthest below the chord of the trade-off between energy and error, both scaled to 1."""
     records = [results.threshold(db, True) for db in THRESHOLDS_DB]
     spent = np.array([record.energy_mj.mean() for record in records])
-    error = np.array([rmse_m(record)[0] for record in records])
+    error = np.array([record.pooled_rms_m()[0] for record in records])
     x, y = (spent - spent[-1]) / (spent[0] - spent[-1]), (error - error[0]) / (error[-1] - error[0])
     return THRESHOLDS_DB[int((x + y).argmin())]
 
@@ -243,7 +241,8 @@ def _hysteresis(results: Results) -> Claim:
     same = difference.mean() <= max(2 * standard_error(difference), 0.02 * base.rms_m().mean())
     good = bool(calm.handover.mean() <= 0.6 * base.handover.mean() and same)
     ours = "; ".join(
-        f"{db:g} dB: {r.handover.mean():.3f} handovers a period, {rmse_m(r)[0]:.2f} m" for db, r in records.items()
+        f"{db:g} dB: {r.handover.mean():.3f} handovers a period, {r.pooled_rms_m()[0]:.2f} m"
+        for db, r in records.items()
     )
     what = "A head that stays until another is 3 dB stronger halves the handovers at the same error"
     return Claim(what, "-", ours, verdict(good, good))

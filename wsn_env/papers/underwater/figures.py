@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from wsn_env.papers.report import Sheet, write_picture, write_sheet
+from wsn_env.papers.colours import BLUE, GREEN, GREY, PURPLE, SKY, VERMILION, YELLOW
+from wsn_env.papers.report import Sheet, by_period, new_axes, write_picture, write_sheet
 from wsn_env.papers.rollout import Record
 from wsn_env.papers.underwater.claims import energy_j
 from wsn_env.papers.underwater.systems import (
@@ -19,17 +20,15 @@ from wsn_env.papers.underwater.systems import (
     THRESHOLDS_DB,
     Results,
     lost,
-    rmse_m,
 )
 from wsn_env.physics.acoustics import absorption_db_per_km, ambient_noise_db
 from wsn_env.scenario import Scenario
 from wsn_env.types import PURPOSES
 
-# Okabe and Ito's colours, which colour-blind readers tell apart.
-COLOURS = dict(zip(PURPOSES, ("#56B4E9", "#009E73", "#F0E442", "#0072B2", "#CC79A7", "#999999"), strict=True))
+COLOURS = dict(zip(PURPOSES, (SKY, GREEN, YELLOW, BLUE, PURPLE, GREY), strict=True))
 LOOKS = {
-    "systematic": dict(color="#D55E00"),
-    "spread": dict(color="#0072B2"),
+    "systematic": dict(color=VERMILION),
+    "spread": dict(color=BLUE),
     "carried": dict(linestyle="-"),
     "redrawn": dict(linestyle="--"),
 }
@@ -65,8 +64,9 @@ def resampling(results: Results) -> Sheet:
         for particles in PARTICLES:
             for handover in HANDOVERS:
                 for name in RESAMPLINGS:
-                    record = results.resampling(noise, particles, handover, name)
-                    rows.append((noise, particles, handover, name, *rmse_m(record), lost(record).mean(), results.runs))
+                    cell = noise, particles, handover, name
+                    record = results.resampling(*cell)
+                    rows.append((*cell, *record.pooled_rms_m(), lost(record).mean(), results.runs))
     columns = ("noise_m2s3", "particles", "handover", "resampling", "rmse_m", "stderr_m", "lost", "runs")
     return Sheet(columns, rows)
 
@@ -77,8 +77,7 @@ def error_per_period(results: Results) -> Sheet:
     errors = [
         np.sqrt(results.resampling(SMOOTH, 300, handover, name).square_error()).mean(axis=0) for name, handover in cells
     ]
-    rows = [(k + 1, *values) for k, values in enumerate(zip(*errors, strict=True))]
-    return Sheet(("period", *(f"{name}_{handover}_m" for name, handover in cells)), rows)
+    return by_period([f"{name}_{handover}_m" for name, handover in cells], errors)
 
 
 def thresholds(results: Results) -> Sheet:
@@ -88,7 +87,7 @@ def thresholds(results: Results) -> Sheet:
         radius_m = Scenario.named("Underwater-v0", threshold_db=threshold_db).radius_m
         for silent in (False, True):
             record = results.threshold(threshold_db, silent)
-            rows.append((threshold_db, radius_m, silent, *rmse_m(record), *_costs(record)))
+            rows.append((threshold_db, radius_m, silent, *record.pooled_rms_m(), *_costs(record)))
     return Sheet(("threshold_db", "radius_m", "silence_told", "rmse_m", "stderr_m", *COSTS), rows)
 
 
@@ -97,7 +96,7 @@ def hysteresis(results: Results) -> Sheet:
     rows = []
     for hysteresis_db in HYSTERESES_DB:
         record = results.hysteresis(hysteresis_db)
-        rows.append((hysteresis_db, *rmse_m(record), record.handover.mean(), *_costs(record)))
+        rows.append((hysteresis_db, *record.pooled_rms_m(), record.handover.mean(), *_costs(record)))
     return Sheet(("hysteresis_db", "rmse_m", "stderr_m", "handovers", *COSTS), rows)
 
 
@@ -110,7 +109,7 @@ def _costs(record: Record) -> tuple[float, ...]:
 
 def draw_error(sheet: Sheet):
     """How systematic resampling loses the target."""
-    figure, axes = _axes("Smooth motion, 300 particles", "period (5 s)", "mean error over the runs [m]")
+    figure, axes = new_axes("Smooth motion, 300 particles", "period (5 s)", "mean error over the runs [m]")
     period, *columns = (np.array(column, dtype=float) for column in zip(*sheet.rows, strict=True))
     for name, values in zip(sheet.columns[1:], columns, strict=True):
         resampling, handover, _ = name.split("_")
@@ -124,11 +123,11 @@ def draw_error(sheet: Sheet):
 
 def draw_thresholds(results: Results):
     """Energy against error."""
-    figure, axes = _axes("Threshold of a report, from 80 to 92 dB", "energy [J per period]", "RMSE [m]")
-    for silent, label, colour in ((False, "silence ignored", "#D55E00"), (True, "silence told", "#0072B2")):
+    figure, axes = new_axes("Threshold of a report, from 80 to 92 dB", "energy [J per period]", "RMSE [m]")
+    for silent, label, colour in ((False, "silence ignored", VERMILION), (True, "silence told", BLUE)):
         records = [results.threshold(threshold_db, silent) for threshold_db in THRESHOLDS_DB]
         energy = [record.energy_mj.mean() / 1e3 for record in records]
-        rmse, doubt = zip(*map(rmse_m, records), strict=True)
+        rmse, doubt = zip(*map(Record.pooled_rms_m, records), strict=True)
         axes.errorbar(energy, rmse, yerr=doubt, marker="o", markersize=4, capsize=2, color=colour, label=label)
         for x, y, threshold_db in zip(energy, rmse, THRESHOLDS_DB, strict=True):
             if silent:
@@ -139,7 +138,7 @@ def draw_thresholds(results: Results):
 
 def draw_energy(results: Results):
     """Energy of a period by purpose."""
-    figure, axes = _axes("What the energy is for", "threshold [dB]", "energy [J per period]")
+    figure, axes = new_axes("What the energy is for", "threshold [dB]", "energy [J per period]")
     names = [f"{threshold_db:g}" for threshold_db in THRESHOLDS_DB]
     spent = [energy_j(results.threshold(threshold_db, True)) for threshold_db in THRESHOLDS_DB]
     base = np.zeros(len(names))
@@ -151,14 +150,3 @@ def draw_energy(results: Results):
         base += joules
     axes.legend(frameon=False)
     return figure
-
-
-def _axes(title: str, x: str, y: str):
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.0, 4.2), layout="constrained")
-    axes = figure.subplots()
-    axes.set(title=title, xlabel=x, ylabel=y)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(alpha=0.25)
-    return figure, axes

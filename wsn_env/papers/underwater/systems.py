@@ -109,13 +109,6 @@ def lost(record: Record) -> np.ndarray:
     return error[:, -LOST_PERIODS:].mean(axis=1) > LOST_M
 
 
-def rmse_m(record: Record) -> tuple[float, float]:
-    """Root of the mean square error over all runs and periods, and its standard error (by the delta method)."""
-    square = record.square_error().mean(axis=1)
-    rmse = sqrt(square.mean())
-    return rmse, float(np.std(square, ddof=1) / sqrt(len(square)) / (2 * rmse))
-
-
 def median_rms_m(record: Record) -> tuple[float, float]:
     """Median of the runs' RMS, and its standard error (bootstrap)."""
     rms = record.rms_m()
