@@ -31,7 +31,8 @@ class StrongestSignal(ViewPolicy):
 
     def act(self, view: View) -> Cluster:
         """Follow, for every row."""
-        signal = np.where(view.detected & view.alive, self._signal(view), -np.inf)
+        heard = view.detected & view.alive & (view.sees if self.scenario.binary else True)  # a bit of 0 is no signal
+        signal = np.where(heard, self._signal(view), -np.inf)
         strongest = signal.argmax(axis=1)
         standing = view.head >= 0
         own = np.where(standing, signal[view.rows, np.maximum(view.head, 0)], -np.inf)

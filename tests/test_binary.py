@@ -165,6 +165,9 @@ def test_a_search_asks_everybody():
 # --- the particle filter on the bitmap ----------------------------------------------------------------------
 
 
+NOBODY = np.empty(0, np.int32)  # has reported
+
+
 def cloud(width=30.0, n=500):
     x = np.random.default_rng(0).normal(100, width, (4, n)).astype(np.float32)
     return x, np.zeros(n, np.float32)
@@ -173,16 +176,27 @@ def cloud(width=30.0, n=500):
 @pytest.mark.parametrize("detects", [True, False])
 @pytest.mark.parametrize(
     ("overrides", "wrong"),
-    [({}, 1e-6), (dict(flip=0.02), 0.02), (dict(packet_success=0.7, retries=0), 0.3), (dict(packet_success=0.0), 0.5)],
+    [
+        ({}, 1e-6),
+        (dict(flip=0.02), 0.02),
+        (dict(packet_success=0.7, retries=0), 0.3),
+        (dict(packet_success=0.0), 0.5),
+        (dict(ceiling=0.6), 1e-6),
+    ],
 )
 def test_a_state_weighs_like_plain_numpy(detects, overrides, wrong):
-    """A lost report leaves a bit as wrong as a misreading does."""
-    x, log_weights = cloud()
-    c = constants(scene(edge_m=2.0, **overrides))[0]
-    weigh_state(x, log_weights, np.array([120.0, 90.0]), detects, c)
-    distance = np.hypot(x[0].astype(float) - 120, x[2].astype(float) - 90)
-    p = wrong + (1 - 2 * wrong) / (1 + np.exp((distance - 40) / 2))
-    np.testing.assert_allclose(log_weights, np.log(p if detects else 1 - p), rtol=2e-4, atol=2e-5)
+    """A lost report leaves a bit as wrong as a misreading does; one that arrived is only misread."""
+    for reported in (False, True):
+        x, log_weights = cloud()
+        scenario = scene(edge_m=2.0, **overrides).override(positions=((120.0, 90.0),))
+        state, c = World(scenario).reset([0]), constants(scenario)[0]
+        state.network.row["head"] = 0
+        nodes = np.array([0] if reported else [], np.int32)
+        weigh_states(x, log_weights, state.network, np.array([detects], np.int8), nodes, 0, c)
+        f = max(overrides.get("flip", 0.0), 1e-6) if reported else wrong
+        distance = np.hypot(x[0].astype(float) - 120, x[2].astype(float) - 90)
+        p = f + (1 - 2 * f) * scenario.detection.ceiling / (1 + np.exp((distance - 40) / 2))
+        np.testing.assert_allclose(log_weights, np.log(p if detects else 1 - p), rtol=2e-4, atol=2e-5)
 
 
 @pytest.mark.parametrize("width", [0.5, 5.0, 30.0])
@@ -191,11 +205,11 @@ def test_nodes_that_are_left_out_would_have_told_all_particles_the_same(width):
     *_, (awake, state, _) = play(scenario, some)
     c = constants(scenario)[0]
     x, log_weights = cloud(width)
-    weigh_states(x, log_weights, state.network, state.reports.bitmap[0], 0, c)
+    weigh_states(x, log_weights, state.network, state.reports.bitmap[0], NOBODY, 0, c)
     everyone = np.zeros(500)
     for node in np.flatnonzero(awake):
         one = np.zeros(500, np.float32)
-        weigh_state(x, one, state.network.positions[0, node], state.reports.bitmap[0, node] != 0, c)
+        weigh_state(x, one, state.network.positions[0, node], state.reports.bitmap[0, node] != 0, 0.0, c)
         everyone += one
     difference = everyone - log_weights
     np.testing.assert_allclose(difference, difference[0], atol=2e-3)
@@ -205,16 +219,16 @@ def test_who_sleeps_or_is_dead_tells_nothing():
     scenario = scene(particles=500)
     *_, (awake, state, _) = play(scenario, some)
     c, (x, ours), (_, theirs) = constants(scenario)[0], cloud(5.0), cloud(5.0)
-    weigh_states(x, ours, state.network, state.reports.bitmap[0], 0, c)
+    weigh_states(x, ours, state.network, state.reports.bitmap[0], NOBODY, 0, c)
     dead = np.flatnonzero(awake)[3:9]
     bitmap = np.where(awake, state.reports.bitmap[0], 1 - state.reports.bitmap[0])
-    weigh_states(x, theirs, state.network, bitmap, 0, c)
+    weigh_states(x, theirs, state.network, bitmap, NOBODY, 0, c)
     np.testing.assert_array_equal(ours, theirs)
     state.network.battery[0, dead] = 0.0
     ours[:], theirs[:] = 0, 0
-    weigh_states(x, ours, state.network, bitmap, 0, c)
+    weigh_states(x, ours, state.network, bitmap, NOBODY, 0, c)
     bitmap[dead] = 1 - bitmap[dead]
-    weigh_states(x, theirs, state.network, bitmap, 0, c)
+    weigh_states(x, theirs, state.network, bitmap, NOBODY, 0, c)
     np.testing.assert_array_equal(ours, theirs)
 
 

@@ -222,8 +222,8 @@ def test_a_field_by_seed_can_be_surveyed_too():
     ("overrides", "says"),
     [
         (dict(measurement="rssi"), "Field.positions or Field.field_seed must be given"),
-        (dict(measurement="position", field_seed=1), "allowed are the measurements rssi and rssi_power"),
-        (dict(measurement="rssi", positions=((0, 0),), side_m=1e4, radius_m=0.01), "Detection.radius_m = 0.01"),
+        (dict(measurement="position", field_seed=1), "allowed are the measurements rssi"),
+        (dict(measurement="rssi", positions=((0, 0),), side_m=1e4, radius_m=0.01), "a sensing radius of 0.01 m"),
     ],
 )
 def test_what_cannot_be_surveyed_is_refused(tracker, overrides, says):

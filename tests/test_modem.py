@@ -82,8 +82,8 @@ def test_a_handover_beyond_one_hop_is_relayed_at_the_old_heads_expense():
         talk.step(0)
         outcome = talk.step(3)
         assert outcome.handover[0]
-        assert outcome.energy_j[0, HANDOVER] == near(256 * (hops * TX + RX))
-        assert outcome.spent_j[0, 0] == near(256 * hops * TX + ASLEEP)
+        assert outcome.energy_j[0, HANDOVER] == near(256 * hops * (TX + RX))
+        assert outcome.spent_j[0, 0] == near(256 * (hops * TX + (hops - 1) * RX) + ASLEEP)
         assert outcome.spent_j[0, 3] == near(256 * RX + AWAKE)
 
 
@@ -110,7 +110,7 @@ def test_the_word_to_resample_is_one_transmission():
 def test_energies_that_policies_ask_for():
     modem = Modem()
     assert modem.sending_j(64, 200.0) == near(64 * TX) and modem.receiving_j(64) == near(64 * RX)
-    assert modem.sending_j(64, 600.0) == near(3 * 64 * TX)
+    assert modem.sending_j(64, 600.0) == near(64 * (3 * TX + 2 * RX))
     assert modem.report_s == near(0.1 + 250 / 1500)
     radio = Radio()
     assert (radio.hop_m, radio.asleep_j(5.0), radio.awake_j(5.0)) == (np.inf, 0.0, 0.0)

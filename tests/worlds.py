@@ -37,7 +37,6 @@ def scenarios(draw, trackers=TRACKERS, modem_hops_m=(30.0, 70.0, 250.0), **fixed
         handover=draw(st.sampled_from(["estimate", "estimate", "particles"])),
         receiver=draw(st.sampled_from(["head", "head", "sink", "target"])),
         tracker=tracker,
-        gate_m=draw(st.sampled_from([None, None, 2.0, 20.0])),
         particles=draw(st.sampled_from([2, 3, 16, 17, 50, 300])),
         fusion=draw(st.sampled_from(["joint", "pooled"])),
         resample_below=draw(st.sampled_from([2 / 3, 2 / 3, 0, 1])),
@@ -55,6 +54,8 @@ def scenarios(draw, trackers=TRACKERS, modem_hops_m=(30.0, 70.0, 250.0), **fixed
         overrides |= draw(binary_sensors(tracker))
     if tracker == "particle":
         overrides |= draw(cloud(measurement))
+    if tracker in BOUNDARY_TRACKERS:
+        overrides["gate_m"] = draw(st.sampled_from([None, None, 2.0, 20.0]))
     if draw(st.booleans()):
         overrides |= dict(layout="grid", nodes=isqrt(overrides["nodes"]) ** 2, jitter=draw(st.sampled_from([0.25, 0])))
     overrides |= fixed

@@ -44,7 +44,7 @@ class Reproduce:
     paper: Annotated[str, tyro.conf.Positional]
     """Which: pre_dc, binary, grnn, underwater; all: each into a folder of its own."""
     out: Path
-    """Folder for the tables and pictures."""
+    """Folder for the tables and pictures; papers share names of files, so give each one of its own."""
     runs: int = 100
     """Monte Carlo runs a cell."""
 
@@ -65,7 +65,8 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"wsn: {problem}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("wsn: stopped; evaluate --out continues where it was", file=sys.stderr)
+        kept = isinstance(command, Evaluate) and command.out
+        print("wsn: stopped" + ("; the same command continues where it was" if kept else ""), file=sys.stderr)
         return 130
     return 0
 
@@ -117,7 +118,8 @@ def run_compile(command: Compile) -> None:
             env.step(10)
     scenarios = [Scenario.named("PreDC-v0", tracker=tracker) for tracker in ("particle", "snapshot", "ickf")]
     scenarios.append(Scenario.named("Binary-v0", nodes=20, tracker="boundary"))
-    scenarios.append(Scenario.named("Rssi-v0", nodes=20, tracker="grnn", field_seed=0))
+    for tracker in ("grnn", "nonlinear_ls"):
+        scenarios.append(Scenario.named("Rssi-v0", nodes=20, tracker=tracker, field_seed=0))
     for scenario in (scenario.override(particles=20, periods=2) for scenario in scenarios):
         for policy in ("pre_dc", "random"):
             for state, _ in episodes(make_policy(policy, scenario), World(scenario), [0]):

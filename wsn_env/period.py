@@ -306,8 +306,12 @@ def _wake_all(state, outcome, b, c):
         outcome.row[b].members += 1
         squared = squared_distance(positions, node, target[0], target[1])
         if battery[node] > 0.0 and sensing.tells(key, period, node, squared, c):
-            has_strength = c.model != sensing.POSITION and c.model != sensing.BINARY
-            signal = sensing.measured_strength(key, period, node, squared, c) if has_strength else -squared
+            if c.model == sensing.POSITION:
+                signal = -squared
+            elif c.model == sensing.BINARY:  # one bit has no strength: the first by number
+                signal = 0.0
+            else:
+                signal = sensing.measured_strength(key, period, node, squared, c)
             if signal > best:
                 strongest, best = node, signal
     return strongest
@@ -348,7 +352,7 @@ def _settle(state, outcome, b, c):
     """The dead, the costs, and the prediction for the next period (eq. 16)."""
     belief, out, target = state.belief.row[b], outcome.row[b], _target(state, b)
     mean, cov = belief.mean, belief.cov
-    _bury(state.network, b)
+    _bury(state.network, b, c)
     total = 0.0
     for joules in out.energy_j:
         total += joules
@@ -366,15 +370,19 @@ def _settle(state, outcome, b, c):
 
 
 @lean_piece
-def _bury(network, b):
-    """Take the dead out of the cluster."""
+def _bury(network, b, c):
+    """Take the dead out of the cluster. It ends with its head, unless the head is a node like the others."""
     standing, battery, members = network.row[b], network.battery[b], network.members[b]
     if standing.head >= 0 and battery[standing.head] <= 0.0:
         standing.head = -1
-        standing.n_members = 0
+        if c.receiver == radio.TO_HEAD:
+            standing.n_members = 0
     living = 0
     for k in range(standing.n_members):
         if battery[members[k]] > 0.0:
-            members[living] = members[k]
-            living += 1
+            if standing.head < 0:
+                standing.head = members[k]
+            else:
+                members[living] = members[k]
+                living += 1
     standing.n_members = living

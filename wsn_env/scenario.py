@@ -94,6 +94,18 @@ class Scenario(Section):
             raise ScenarioError(
                 f"Binary.reports = {self.measurement.reports!r}: allowed is 'changes' with the tracker {name!r}"
             )
+        needless = {
+            "silent_information": name != "particle",
+            "resampling": name != "particle",
+            "redraw_on_handover": name != "particle",
+            "gate_m": name not in BOUNDARY_TRACKERS,
+        }
+        usual = {item.name: item.default for item in fields(self.tracking)}
+        wrong = [item for item, idle in needless.items() if idle and getattr(self.tracking, item) != usual[item]]
+        if wrong:
+            given = ", ".join(f"Tracking.{item} = {getattr(self.tracking, item)!r}" for item in wrong)
+            allowed = ", ".join(repr(usual[item]) for item in wrong)
+            raise ScenarioError(f"{given}: allowed is {allowed} with the tracker {name!r}, which makes no use of it")
         if self.binary and self.tracking.silent_information:
             raise ScenarioError(
                 "Tracking.silent_information = True: allowed is False with Binary reports, whose bitmap already tells"

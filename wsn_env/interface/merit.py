@@ -6,7 +6,7 @@ from wsn_env.compiling import kernel, lean_piece
 from wsn_env.numerics import exp, normal_cdf
 from wsn_env.physics.field import squared_distance
 from wsn_env.physics.radio import TO_HEAD, outside, transmission
-from wsn_env.physics.sensing import BINARY, detection_piece, strength
+from wsn_env.physics.sensing import BINARY, POSITION, POWER, SONAR, detection_piece, strength
 
 TWO_PI = 6.283185307179586
 ORDERS = ("nearest", "information", "value")
@@ -32,7 +32,7 @@ def gain(detection, positions, node, mean, cov, p00, p01, p11, c):
     Returns: gain, and the three entries of the covariance after.
     """
     r = c.noise * c.noise / max(detection, 1e-6)
-    if c.model == 0:
+    if c.model == POSITION:
         s00, s11 = p00 + r, p11 + r
         det = s00 * s11 - p01 * p01
         q00 = p00 - (p00 * p00 * s11 - 2.0 * p00 * p01 * p01 + p01 * p01 * s00) / det
@@ -49,9 +49,9 @@ def gain(detection, positions, node, mean, cov, p00, p01, p11, c):
     # The slope of the strength, smoothed over the belief's own width.
     squared = max(dx * dx + dy * dy + 0.5 * (cov[0, 0] + cov[2, 2]), c.floor_m * c.floor_m)
     slope = -2.0 * c.slope / squared
-    if c.model == 2:
+    if c.model == POWER:
         slope *= strength(squared, c)
-    elif c.model == 3:
+    elif c.model == SONAR:
         slope -= c.absorption / np.sqrt(squared)
     h0, h1 = slope * dx, slope * dy
     b0, b1 = p00 * h0 + p01 * h1, p01 * h0 + p11 * h1

@@ -75,8 +75,9 @@ def frame(state: State, scenario: Scenario, row: int = 0) -> np.ndarray:
         disc(*belief.mean[row, ::2], scenario.ring_m * scale, outline=MEMBER)
     _cross(draw, *pixel(*belief.mean[row, ::2]), ESTIMATE)
     disc(*target, 5, outline=TRUTH, width=3)
+    receiving = {"head": "head", "sink": "sink", "target": ""}[scenario.radio.receiver]
     legend = (
-        ("sink" if scenario.radio.receiver == "sink" else "head", HEAD),
+        (receiving, HEAD if receiving else PAPER),
         ("member", MEMBER),
         ("report", REPORT),
         ("particles", CLOUD),

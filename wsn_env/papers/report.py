@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 from rich.markup import escape
@@ -83,8 +84,10 @@ def prepare(out: Path) -> None:
         raise ValueError("pictures need matplotlib: pip install 'wsn_env[plot]'")
     try:
         out.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=out):
+            pass
     except OSError as problem:
-        raise ValueError(f"out = {str(out)!r}: cannot be made a folder: {problem}") from None
+        raise ValueError(f"out = {str(out)!r}: must be a folder that files can be written to: {problem}") from None
 
 
 def write_sheet(path: Path, sheet: Sheet) -> None:

@@ -130,14 +130,14 @@ def broadcast(state, outcome, b, c):
 
 @lean_piece
 def _hand_over(old, head, state, outcome, b, c):
-    """The old head's packet to the new one; beyond one hop it is relayed, each time at the old head's expense.
+    """The old head's packet to the new one; beyond one hop it is relayed, and the old head pays for its relays.
 
     Returns: as `send`.
     """
     positions, battery = state.network.positions[b], state.network.battery[b]
     squared = squared_distance(positions, old, positions[head, 0], positions[head, 1])
     hops = max(np.ceil(np.sqrt(squared) / c.hop_m), 1.0)
-    sending = hops * transmission(c.handover_bits, squared, c)
+    sending = hops * transmission(c.handover_bits, squared, c) + (hops - 1.0) * c.handover_bits * c.rx_j_per_bit
     if battery[old] <= 0.0 or not spend(old, sending, HANDOVER, state, outcome, b):
         return False
     return battery[head] > 0.0 and spend(head, c.handover_bits * c.rx_j_per_bit, HANDOVER, state, outcome, b)

@@ -10,15 +10,16 @@ from wsn_env.compiling import lean_kernel, lean_piece
 from wsn_env.numerics import exp, log, normal_cdf
 from wsn_env.physics.constants import sensing_constants
 from wsn_env.physics.field import squared_distance
-from wsn_env.sections import Binary, Detection, Level, Measurement, Position, Threshold
+from wsn_env.sections import Binary, Detection, Level, Measurement, Position, Rssi, RssiPower, Sonar, Threshold
 
-POSITION, BINARY = Position.code, Binary.code
+POSITION, STRENGTH, POWER, SONAR, BINARY = (kind.code for kind in (Position, Rssi, RssiPower, Sonar, Binary))
+THRESHOLD = Threshold.code
 
 
 @lean_piece
 def detection_piece(distance, c):
     """Eqs. 2-3, or that of a threshold, for one distance [m] and a record of constants."""
-    if c.detection == 1:
+    if c.detection == THRESHOLD:
         if distance >= c.reach_m:
             return 0.0
         return normal_cdf((strength(distance * distance, c) - c.threshold_db) / c.noise)
@@ -81,7 +82,7 @@ def joint_detection_probability(probabilities):
 @lean_piece
 def detects(key, period, node, squared, c):
     """Whether a node, if awake, detects the target at a squared distance [m^2] in this period."""
-    if c.detection == 1:
+    if c.detection == THRESHOLD:
         return measured_strength(key, period, node, squared, c) > c.threshold_db
     p = detection_piece(np.sqrt(squared), c)
     return p > 0.0 and draws.uniform(draws.stream(key, period, draws.DETECTION), node) < p
@@ -99,9 +100,9 @@ def strength(squared, c):
     """Noise-free strength at a squared distance [m^2], in dB or in power."""
     near = max(squared, c.floor_m * c.floor_m, 1e-12)
     fall = c.slope * log(near)
-    if c.model == 2:
+    if c.model == POWER:
         return c.level * exp(-fall)
-    return c.level - fall - (c.absorption * np.sqrt(near) if c.model == 3 else 0.0)
+    return c.level - fall - (c.absorption * np.sqrt(near) if c.model == SONAR else 0.0)
 
 
 def expected_strengths(points, nodes, measurement: Measurement):
@@ -155,7 +156,7 @@ def measure(key, period, node, positions, target, c, value):
     Args:
         target: (x, y), the true position [m].
     """
-    if c.model == 0:
+    if c.model == POSITION:
         e0, e1 = draws.normal_pair(draws.stream(key, period, draws.MEASUREMENT), node)
         value[0] = target[0] + c.noise * e0
         value[1] = target[1] + c.noise * e1

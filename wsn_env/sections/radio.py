@@ -51,9 +51,10 @@ class Link(Section):
         return 1.0 if self.receiver == "head" else self.delivery
 
     def sending_j(self, bits: float, distance_m: float) -> float:
-        """Energy of sending over a distance, relayed where it is beyond one hop: bits (e1 + e2 d^2) for each."""
+        """Energy of sending over a distance: bits (e1 + e2 d^2) for each hop, and what its relays pay for receiving."""
         hops = max(1, math.ceil(distance_m / self.hop_m))
-        return hops * bits * (self.tx_j_per_bit + self.amplifier_j_per_bit_m2 * distance_m**2)
+        hop = self.tx_j_per_bit + self.amplifier_j_per_bit_m2 * distance_m**2
+        return bits * (hops * hop + (hops - 1) * self.rx_j_per_bit)
 
     def receiving_j(self, bits: float) -> float:
         """Energy of receiving: bits e_r."""

@@ -194,7 +194,11 @@ class Binary(Measurement):
         choices=("changes", "presence"),
     )
     refresh: int = quantity(
-        0, "in every so many periods all awake nodes report their state; 0: never", at_least=0, whole=True
+        0,
+        "in every so many periods all awake nodes report their state; 0: never",
+        at_least=0,
+        at_most=10**9,
+        whole=True,
     )
     flip: float = quantity(0.0, "probability that a node misreads its state in a period", at_least=0, below=0.5)
     edge_m: float = quantity(1.0, "width of the edge of detection that the particle filter believes in", above=0)

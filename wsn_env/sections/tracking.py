@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from wsn_env.quantity import ScenarioError, Section, quantity
+from wsn_env.quantity import Section, quantity
 from wsn_env.sections.sensing import MEASUREMENTS, Binary, Position, Rssi, RssiPower, Sonar
 
 BOUNDARY_TRACKERS = ("boundary_raw", "boundary", "boundary_mid", "boundary_ekf", "centroid", "centroid_rls")
@@ -23,7 +23,8 @@ TRACKERS = {  # name: where the class stands
 }
 READS = {  # name: the measurements that it can read
     **dict.fromkeys(TRACKERS, (Position, Rssi, RssiPower, Sonar)),
-    **dict.fromkeys(("trilateration", "nonlinear_ls", "grnn", "grnn_kf"), (Rssi, RssiPower)),
+    **dict.fromkeys(("grnn", "grnn_kf"), (Rssi, RssiPower, Sonar)),
+    **dict.fromkeys(("trilateration", "nonlinear_ls"), (Rssi, RssiPower)),
     **dict.fromkeys(BOUNDARY_TRACKERS, (Binary,)),
     "particle": tuple(MEASUREMENTS.values()),
 }
@@ -87,24 +88,10 @@ class Tracking(Section):
     )
     search: bool = quantity(True, "search for lost tracks", choices=(True, False))
     search_miss: float = quantity(1e-3, "search when missing so long was less probable", above=0, at_most=1)
-    search_gap: int = quantity(5, "periods between searches, at least", at_least=1, whole=True)
+    search_gap: int = quantity(5, "periods between searches, at least", at_least=1, at_most=10**9, whole=True)
     width_search: str = quantity(
         "golden", "how a fingerprint network's width is found: golden section or fruit flies", choices=("golden", "foa")
     )
     training_seed: int = quantity(
         0, "seed of a fingerprint network's training, apart from every episode's", at_least=0, whole=True
     )
-
-    def __post_init__(self):
-        super().__post_init__()
-        if self.silent_information and self.tracker != "particle":
-            raise ScenarioError(
-                f"Tracking.silent_information = True: allowed is False with the tracker {self.tracker!r}; only the"
-                " particle filter knows what silence means"
-            )
-        for name, usual in (("resampling", "systematic"), ("redraw_on_handover", False)):
-            if self.tracker != "particle" and getattr(self, name) != usual:
-                raise ScenarioError(
-                    f"Tracking.{name} = {getattr(self, name)!r}: allowed is {usual!r} with the tracker"
-                    f" {self.tracker!r}, which has no particles"
-                )

@@ -86,7 +86,7 @@ def _correct_rows(start, stop, cs, iterations, beliefs, positions, count, node, 
 @piece
 def _as_vector(value, heard, c):
     """The reports (m,): a strength each, or x and y each."""
-    if c.model == 0:
+    if c.model == sensing.POSITION:
         return value[:heard].copy().reshape(2 * heard)
     return value[:heard, 0].copy()
 
@@ -95,7 +95,7 @@ def _as_vector(value, heard, c):
 def _expect(state, positions, node, heard, c, out):
     """h(x): what these nodes measure but for noise, as `_as_vector` lays it out."""
     for i in range(heard):
-        if c.model == 0:
+        if c.model == sensing.POSITION:
             out[2 * i], out[2 * i + 1] = state[0], state[2]
         else:
             out[i] = sensing.strength(squared_distance(positions, node[i], state[0], state[2]), c)
@@ -110,7 +110,7 @@ def _fit(mean, cov, positions, node, heard, c):
 
     Returns: H (m, 4); the mean value (m,); the residual's covariance (m, m): that of the values less H cov H' = D' D.
     """
-    size = 2 * heard if c.model == 0 else heard
+    size = 2 * heard if c.model == sensing.POSITION else heard
     root = cov.copy()
     _factor(root)
     values = np.empty((8, size))

@@ -155,11 +155,9 @@ def training_of(scenario: Scenario) -> Training:
             f"{name}: a fingerprint map needs nodes that stand in the same places in every episode;"
             " Field.positions or Field.field_seed must be given"
         )
-    training = _training(
-        scenario.field, scenario.measurement, scenario.detection.reach_m, scenario.tracking.training_seed
-    )
+    training = _training(scenario.field, scenario.measurement, scenario.reach_m, scenario.tracking.training_seed)
     if not len(training.points):
-        raise ScenarioError(f"{name}: Detection.radius_m = {scenario.detection.radius_m}: must let nodes hear a target")
+        raise ScenarioError(f"{name}: a sensing radius of {scenario.radius_m:g} m: must let nodes hear a target")
     return training
 
 

@@ -11,7 +11,8 @@ from wsn_env import draws
 from wsn_env.compiling import kernel, lean_kernel, lean_piece, piece
 from wsn_env.draws import normal_pair32
 from wsn_env.numerics import F, exp32, f32_bits, f32_from_bits
-from wsn_env.trackers.likelihood import BINARY, weigh, weigh_awake, weigh_states
+from wsn_env.physics.sensing import BINARY
+from wsn_env.trackers.likelihood import weigh, weigh_awake, weigh_states
 from wsn_env.trackers.resampling import REACH, correlated, lower_root, resample, spread_copies
 from wsn_env.types import Belief, Reports, network_of
 
@@ -169,7 +170,7 @@ def filter_row(key, period, belief, network, reports, b, c, room):
     n, count = x.shape[1], reports.count[b]
     predict(draws.stream(key, period, draws.PROCESS), x, c.period_s, c.q)
     if c.model == BINARY:
-        weigh_states(x, log_weights, network, reports.bitmap[b], b, c)
+        weigh_states(x, log_weights, network, reports.bitmap[b], reports.node[b, :count], b, c)
         count = 0
     for j in range(count):
         position, value = network.positions[b, reports.node[b, j]], reports.value[b, j]

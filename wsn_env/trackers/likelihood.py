@@ -7,10 +7,9 @@ import numpy as np
 
 from wsn_env.compiling import inline_piece, lean_piece
 from wsn_env.numerics import F, exp, exp32, expm1_32, log, log32, log_normal_cdf32
-from wsn_env.sections import Binary, Position, Rssi, RssiPower, Sonar
+from wsn_env.physics.radio import TO_HEAD
+from wsn_env.physics.sensing import POSITION, SONAR, STRENGTH, THRESHOLD
 
-POSITION, STRENGTH, POWER = Position.code, Rssi.code, RssiPower.code
-SONAR, BINARY = Sonar.code, Binary.code
 LOG_LEAST, LOG_MOST = F(-13.815510558), F(-1.0000005e-6)  # p in [1e-6, 1 - 1e-6]: no report rules a particle out
 TINY = F(1e-30)
 
@@ -62,7 +61,7 @@ def weigh_awake(x, log_weights, network, nodes, b, c):
     A report is heard with probability `delivery`, the head's with `head_delivery`. A node without energy tells nothing.
     """
     positions, battery, standing = network.positions[b], network.battery[b], network.row[b]
-    if standing.head < 0:
+    if standing.head < 0 or (c.receiver == TO_HEAD and battery[standing.head] <= 0.0):  # nobody could be heard
         return
     for k in range(-1, standing.n_members):
         node = standing.head if k < 0 else network.members[b, k]
@@ -70,7 +69,7 @@ def weigh_awake(x, log_weights, network, nodes, b, c):
         for other in nodes:
             reported |= other == node
         delivery = c.head_delivery if k < 0 else c.delivery
-        if c.detection == 1:  # a report's value tells all; that it came adds nothing
+        if c.detection == THRESHOLD:  # a report's value tells all; that it came adds nothing
             if not reported and battery[node] > 0.0:
                 weigh_quiet(x, log_weights, positions[node], delivery, c)
         elif reported:
@@ -110,9 +109,9 @@ def weigh_silence(x, log_weights, position, delivery, c):
 
 
 @lean_piece
-def weigh_states(x, log_weights, network, bitmap, b, c):
+def weigh_states(x, log_weights, network, bitmap, nodes, b, c):
     """Add to every particle the log probability of the awake nodes' states as the bitmap (S,) has them: a silent node
-    tells as much as one that reports.
+    tells as much as one of `nodes` (m,), which have reported, but that a report of its own may have been lost.
 
     Nodes whose edge is far from every particle tell all of them the same and are left out.
     """
@@ -125,7 +124,10 @@ def weigh_states(x, log_weights, network, bitmap, b, c):
         node = standing.head if k < 0 else network.members[b, k]
         nearest, farthest = _reach(positions[node], box)
         if battery[node] > 0.0 and nearest < c.radius_m + far and farthest > c.radius_m - far:
-            weigh_state(x, log_weights, positions[node], bitmap[node] != 0, c)
+            wrong = max(c.flip, 1.0 - c.delivery)
+            for other in nodes:
+                wrong = c.flip if other == node else wrong
+            weigh_state(x, log_weights, positions[node], bitmap[node] != 0, wrong, c)
 
 
 @lean_piece
@@ -148,16 +150,19 @@ def _reach(position, box):
 
 
 @lean_piece
-def weigh_state(x, log_weights, position, detects, c):
+def weigh_state(x, log_weights, position, detects, wrong, c):
     """Add to every particle the log probability of the state of the binary sensor at `position`.
 
-    P(1) = f + (1 - 2 f) / (1 + exp((d - R) / s)), s the softness of the edge and f the probability that the bitmap is
-    wrong: by a misreading, or by a change whose report was lost.
+    P(1) = f + (1 - 2 f) l2 / (1 + exp((d - R) / s)), s the softness of the edge and l2 the ceiling of detection.
+
+    Args:
+        wrong: f, the probability that the bitmap is wrong: by a misreading, or by a change whose report was lost.
     """
     px, py = x[0], x[2]
     sx, sy = F(position[0]), F(position[1])
-    flip = min(max(c.flip, 1.0 - c.delivery, 1e-6), 0.5)  # no state rules a particle out
-    least, rest = F(flip), F(1.0 - 2.0 * flip)
+    wrong = min(max(wrong, 1e-6), 0.5)  # no state rules a particle out
+    rest = F((1.0 - 2.0 * wrong) * c.ceiling)
+    least = F(wrong if detects else wrong + (1.0 - 2.0 * wrong) * (1.0 - c.ceiling))
     slope = F((-1.0 if detects else 1.0) / c.edge_m)
     radius = F(c.radius_m)
     for i in range(x.shape[1]):

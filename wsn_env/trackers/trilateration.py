@@ -11,6 +11,7 @@ from wsn_env.trackers.kalman import noise_of
 from wsn_env.types import Belief, Network, Reports
 
 ON_A_LINE = 1e-6  # nodes whose squared extents differ by more than this factor fix no point
+FARTHEST = 10  # sides
 NEWTON_STEPS, NEWTON_END_M = 15, 1e-3
 RIDGE = 1e-6  # 1/m^2: information that keeps the step finite where the likelihood is flat
 
@@ -18,7 +19,8 @@ RIDGE = 1e-6  # 1/m^2: information that keeps the step finite where the likeliho
 class TrilaterationTracker:
     """Memoryless linear least squares (`trilaterate`). Needs three nodes that do not stand on one line.
 
-    With fewer the last estimate stays, and its variance grows by (rest_sd_ms T)^2.
+    With fewer the last estimate stays, and its variance grows by (rest_sd_ms T)^2. What lies FARTHEST sides from the
+    field or more is taken to lie there, and no sd is larger.
     """
 
     particles = 0
@@ -44,11 +46,13 @@ class TrilaterationTracker:
             if found is None:
                 belief.cov[b, [0, 2], [0, 2]] += self._growth
             else:
-                belief.mean[b, [0, 2]], belief.cov[b] = found[0], 0.0
-                belief.cov[b, ::2, ::2] = found[1]
+                far, cov = FARTHEST * self._side_m, found[1]
+                belief.mean[b, [0, 2]] = np.clip(found[0], -far, self._side_m + far)
+                belief.cov[b] = 0.0
+                belief.cov[b, ::2, ::2] = cov * min(1.0, far**2 / max(np.trace(cov), 1e-300))
 
     def _locate(self, nodes, strengths):
-        squared, sd = squared_ranges(strengths, self._measurement, self._noise, 10 * self._side_m)
+        squared, sd = squared_ranges(strengths, self._measurement, self._noise, FARTHEST * self._side_m)
         return trilaterate(nodes, squared, sd)
 
 
@@ -81,7 +85,7 @@ def _fit_point(cs, nodes, strengths, point, cov):
             beyond = (strengths[i] - level) / c.noise
             slope = 0.0
             if squared > max(c.floor_m * c.floor_m, 1e-12):
-                slope = -2.0 * c.slope / (squared * c.noise) * (1.0 if c.model == 1 else level)
+                slope = -2.0 * c.slope / (squared * c.noise) * (1.0 if c.model == sensing.STRENGTH else level)
             a += slope * slope * dx * dx
             b += slope * slope * dx * dy
             d += slope * slope * dy * dy
@@ -107,7 +111,8 @@ def squared_ranges(strengths, measurement: Measurement, noise: float, most_m: fl
         most_m: a weaker strength, and a power that noise has made negative, is taken to come from this far.
     """
     if isinstance(measurement, Rssi):
-        squared = 10 ** ((measurement.reference_dbm - strengths) / (5 * measurement.exponent))
+        lg = (measurement.reference_dbm - strengths) / (5 * measurement.exponent)
+        squared = 10 ** np.minimum(lg, 2 * np.log10(most_m))
         relative = noise * np.log(10) / (5 * measurement.exponent)
     else:
         power = np.maximum(strengths, measurement.amplitude * most_m**-measurement.exponent)

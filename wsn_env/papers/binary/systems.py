@@ -34,7 +34,7 @@ class System:
 
 
 SURE = (("start", "known"), ("start_sd_m", 1e-6), ("start_sd_ms", 1e-6))
-CLOUD = (("filter_q", 0.6), ("particles", 5000), ("rest_sd_ms", 10.0))
+CLOUD = (("filter_q", 0.6), ("particles", 5000), ("rest_sd_ms", 10.0), ("resampling", "spread"))
 SYSTEMS = {
     "raw": System("boundary_raw", tracking=SURE),  # the velocity is given
     "paper": System("boundary"),
@@ -94,7 +94,7 @@ class Setting:
             packet_success=self.success,
             retries=0,
             tracker=system.tracker,
-            gate_m=self.gate_m,
+            gate_m=None if system.tracker == "particle" else self.gate_m,
             filter_q=0.0,
             search=False,
             start="search",
