@@ -24,6 +24,7 @@ FLOORS = {
     "wsn_env.view": 3,
     "wsn_env.episode": 3,
     "wsn_env.period": 3,
+    "wsn_env.search": 3,
     "wsn_env.world": 4,
     "wsn_env.policies": 4,
     "wsn_env.interface": 5,

@@ -47,7 +47,7 @@ def conclude(start, stop, cs, resampled, lost, state, outcome):
 
 
 @lean_piece
-def _target(state, b):
+def target_of(state, b):
     """The true position (x, y) in the present period [m]."""
     k = min(state.row[b].period, state.track.shape[1] - 1)
     return state.track[b, k, 0], state.track[b, k, 2]
@@ -63,7 +63,7 @@ def _sense_and_report(head, chosen, state, outcome, b, c):
     radio.close_books(state.ledger, b)
     _take_choice(head, chosen, state, outcome, b, c)  # handover, invitations [J]
     state.row[b].period += 1
-    target = _target(state, b)  # moves
+    target = target_of(state, b)  # moves
     reports.count[b] = 0
     head, n, members = network.row[b].head, network.row[b].n_members, network.members[b]
     if head >= 0:
@@ -73,8 +73,8 @@ def _sense_and_report(head, chosen, state, outcome, b, c):
             place += 1
         for k in range(n + 1):
             node = head if k == place else members[k - (k > place)]
-            if _wake(node, radio.SENSING, state, outcome, b, c):
-                _sense(node, head, radio.REPORT, target, state, outcome, b, c)
+            if wake(node, radio.SENSING, state, outcome, b, c):
+                sense(node, head, radio.REPORT, target, state, outcome, b, c)
     if c.asleep_j > 0.0:
         _sleep(state, outcome, b, c)
     _remember_miss(state, b, c)
@@ -137,7 +137,7 @@ def _list_living(chosen, battery, found):
 
 
 @lean_piece
-def _wake(node, purpose, state, outcome, b, c):
+def wake(node, purpose, state, outcome, b, c):
     """A node pays for being awake in this period. Returns whether it could."""
     return state.network.battery[b, node] > 0.0 and radio.spend(node, c.awake_j, purpose, state, outcome, b)
 
@@ -156,7 +156,7 @@ def _sleep(state, outcome, b, c):
 
 
 @lean_piece
-def _sense(node, head, purpose, target, state, outcome, b, c):
+def sense(node, head, purpose, target, state, outcome, b, c):
     """An awake node's period: detect, measure, report."""
     positions, battery, reports = state.network.positions[b], state.network.battery[b], state.reports
     key, period = state.key[b], state.row[b].period
@@ -254,92 +254,6 @@ def _is_lost(state, b, c):
 
 
 @lean_kernel
-def search(start, stop, cs, rows, found, state, outcome):
-    """Every living node wakes for the period; the belief's position restarts at the centroid of those that detect.
-
-    Args:
-        rows: (B,) bool, where.
-        found: (B,) bool, set where a node was heard.
-    """
-    c = cs[0]
-    for b in range(start, stop):
-        if not rows[b]:
-            continue
-        outcome.row[b].searched = True
-        state.row[b].last_search = state.row[b].period
-        strongest = _wake_all(state, outcome, b, c)
-        if strongest >= 0:
-            # The new head takes over (the velocity is handed to it) and hears the others.
-            if radio.take_over(strongest, state, outcome, b, c):
-                outcome.row[b].handover = True
-            outcome.row[b].detections = 0
-            state.reports.count[b] = 0
-            for node in range(state.network.battery.shape[1]):
-                _sense(node, strongest, radio.SEARCH, _target(state, b), state, outcome, b, c)
-            found[b] = _restart_at_centroid(state, b, c)
-        elif c.model == sensing.BINARY:  # asked, all keep silent
-            state.sensed[b] = 0
-            state.reports.bitmap[b] = 0
-
-
-@lean_piece
-def _wake_all(state, outcome, b, c):
-    """Wake-up call to all, sensing by those that slept.
-
-    Returns: the living node with the strongest signal of the target, which is the nearest that detects it, or the one
-    that measured the greatest strength; -1: nobody detects it.
-    """
-    network, standing = state.network, state.network.row[b]
-    positions, battery, members = network.positions[b], network.battery[b], network.members[b]
-    key, period, target = state.key[b], state.row[b].period, _target(state, b)
-    call = c.wakeup_bits * c.rx_j_per_bit
-    strongest, best, j = -1, -np.inf, 0
-    outcome.row[b].members = 0
-    for node in range(len(battery)):
-        while j < standing.n_members and members[j] < node:
-            j += 1
-        awake = node == standing.head or (j < standing.n_members and members[j] == node)
-        if battery[node] <= 0.0 or not radio.spend(node, call, radio.SEARCH, state, outcome, b):
-            continue
-        if not awake and not _wake(node, radio.SEARCH, state, outcome, b, c):
-            continue
-        outcome.row[b].members += 1
-        squared = squared_distance(positions, node, target[0], target[1])
-        if battery[node] > 0.0 and sensing.tells(key, period, node, squared, c):
-            if c.model == sensing.POSITION:
-                signal = -squared
-            elif c.model == sensing.BINARY:  # one bit has no strength: the first by number
-                signal = 0.0
-            else:
-                signal = sensing.measured_strength(key, period, node, squared, c)
-            if signal > best:
-                strongest, best = node, signal
-    return strongest
-
-
-@lean_piece
-def _restart_at_centroid(state, b, c):
-    """Position belief about the centroid of the nodes heard, sd r_s / sqrt(n); the velocity's stays. Returns whether
-    any was heard."""
-    heard, positions = state.reports.count[b], state.network.positions[b]
-    if heard == 0:
-        return False
-    x, y = 0.0, 0.0
-    for k in range(heard):
-        x += positions[state.reports.node[b, k], 0]
-        y += positions[state.reports.node[b, k], 1]
-    mean, cov = state.belief.row[b].mean, state.belief.row[b].cov
-    mean[0], mean[2] = x / heard, y / heard
-    for axis in (0, 2):
-        for other in range(4):
-            cov[axis, other] = 0.0
-            cov[other, axis] = 0.0
-    cov[0, 0] = cov[2, 2] = c.radius_m * c.radius_m / heard
-    state.row[b].log_miss = 0.0
-    return True
-
-
-@lean_kernel
 def settle(start, stop, cs, rows, state, outcome):
     """The end of the period in the rows marked."""
     for b in range(start, stop):
@@ -350,7 +264,7 @@ def settle(start, stop, cs, rows, state, outcome):
 @lean_piece
 def _settle(state, outcome, b, c):
     """The dead, the costs, and the prediction for the next period (eq. 16)."""
-    belief, out, target = state.belief.row[b], outcome.row[b], _target(state, b)
+    belief, out, target = state.belief.row[b], outcome.row[b], target_of(state, b)
     mean, cov = belief.mean, belief.cov
     _bury(state.network, b, c)
     total = 0.0

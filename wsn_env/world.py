@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wsn_env import compiling, episode, period
+from wsn_env import compiling, episode, period, search
 from wsn_env.compiling import available_threads, over_rows, threads_for
 from wsn_env.physics.constants import constants
 from wsn_env.physics.motion import motion_parameters
@@ -104,7 +104,7 @@ class World:
 
     def _search(self, rows, state: State, outcome: Outcome) -> None:
         found = np.zeros(state.rows, bool)
-        self._in_rows(rows, period.search, found, state, outcome)
+        self._in_rows(rows, search.search, found, state, outcome)
         self.tracker.relocate(state.key, state.period.copy(), found, state.belief)
 
     def _over_rows(self, kernel, *arguments) -> int:

@@ -6,7 +6,7 @@ from wsn_env.compiling import kernel, lean_piece
 from wsn_env.numerics import exp, normal_cdf
 from wsn_env.physics.field import squared_distance
 from wsn_env.physics.radio import TO_HEAD, outside, transmission
-from wsn_env.physics.sensing import BINARY, POSITION, POWER, SONAR, detection_piece, strength
+from wsn_env.physics.sensing import BINARY, POSITION, detection_piece, strength_slope
 
 TWO_PI = 6.283185307179586
 ORDERS = ("nearest", "information", "value")
@@ -48,11 +48,7 @@ def gain(detection, positions, node, mean, cov, p00, p01, p11, c):
         return (b0 * b0 + b1 * b1) / s, p00 - b0 * b0 / s, p01 - b0 * b1 / s, p11 - b1 * b1 / s
     # The slope of the strength, smoothed over the belief's own width.
     squared = max(dx * dx + dy * dy + 0.5 * (cov[0, 0] + cov[2, 2]), c.floor_m * c.floor_m)
-    slope = -2.0 * c.slope / squared
-    if c.model == POWER:
-        slope *= strength(squared, c)
-    elif c.model == SONAR:
-        slope -= c.absorption / np.sqrt(squared)
+    slope = strength_slope(squared, c)
     h0, h1 = slope * dx, slope * dy
     b0, b1 = p00 * h0 + p01 * h1, p01 * h0 + p11 * h1
     s = h0 * b0 + h1 * b1 + r

@@ -3,6 +3,8 @@
 The likelihood of a measurement over a particle cloud stands with the filter, in trackers/kernels.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from wsn_env import draws
@@ -10,7 +12,7 @@ from wsn_env.compiling import lean_kernel, lean_piece
 from wsn_env.numerics import exp, log, normal_cdf
 from wsn_env.physics.constants import sensing_constants
 from wsn_env.physics.field import squared_distance
-from wsn_env.sections import Binary, Detection, Level, Measurement, Position, Rssi, RssiPower, Sonar, Threshold
+from wsn_env.sections import Binary, Detection, Measurement, Position, Rssi, RssiPower, Sonar, Threshold
 
 POSITION, STRENGTH, POWER, SONAR, BINARY = (kind.code for kind in (Position, Rssi, RssiPower, Sonar, Binary))
 THRESHOLD = Threshold.code
@@ -105,6 +107,34 @@ def strength(squared, c):
     return c.level - fall - (c.absorption * np.sqrt(near) if c.model == SONAR else 0.0)
 
 
+@lean_piece
+def strength_slope(squared, c):
+    """Derivative of the noise-free strength by distance, over the distance [1/m^2]; times (dx, dy), its gradient.
+
+    0 nearer than the floor.
+    """
+    if squared < max(c.floor_m * c.floor_m, 1e-12):
+        return 0.0
+    slope = -2.0 * c.slope / squared
+    if c.model == POWER:
+        slope *= strength(squared, c)
+    elif c.model == SONAR:
+        slope -= c.absorption / np.sqrt(squared)
+    return slope
+
+
+@lean_kernel
+def _strengths(cs, squared, strengths, slopes):
+    for i in range(len(squared)):
+        strengths[i] = strength(squared[i], cs[0])
+        slopes[i] = strength_slope(squared[i], cs[0])
+
+
+@lru_cache
+def _constants_of(measurement: Measurement):
+    return sensing_constants(Detection(), measurement)
+
+
 def expected_strengths(points, nodes, measurement: Measurement):
     """Noise-free strengths (eq. 1) of targets at some points, at every node.
 
@@ -115,8 +145,7 @@ def expected_strengths(points, nodes, measurement: Measurement):
 
     Returns: (..., n).
     """
-    offset = np.asarray(points)[..., None, :] - nodes
-    return _strength_law((offset**2).sum(axis=-1), measurement)
+    return _over_offsets(points, nodes, measurement)[1]
 
 
 def strength_slopes(points, nodes, measurement: Measurement):
@@ -124,22 +153,16 @@ def strength_slopes(points, nodes, measurement: Measurement):
 
     Returns: (..., n, 2).
     """
+    offset, _, slopes = _over_offsets(points, nodes, measurement)
+    return slopes[..., None] * offset
+
+
+def _over_offsets(points, nodes, measurement: Measurement):
     offset = np.asarray(points)[..., None, :] - nodes
     squared = (offset**2).sum(axis=-1)
-    if isinstance(measurement, Level):
-        fall = 10 * measurement.exponent / np.log(10) + measurement.absorption_db_per_m * np.sqrt(squared)
-    else:
-        fall = measurement.exponent * _strength_law(squared, measurement)
-    fall = np.where(squared < measurement.floor_m**2, 0.0, fall) / np.maximum(squared, 1e-12)
-    return -fall[..., None] * offset
-
-
-def _strength_law(squared, measurement: Measurement):
-    squared = np.maximum(squared, max(measurement.floor_m**2, 1e-12))
-    if isinstance(measurement, Level):
-        fall = 5 * measurement.exponent * np.log10(squared) + measurement.absorption_db_per_m * np.sqrt(squared)
-        return measurement.at_1m_db - fall
-    return measurement.amplitude * squared ** (-measurement.exponent / 2)
+    strengths, slopes = np.empty(squared.size), np.empty(squared.size)
+    _strengths(_constants_of(measurement), squared.ravel(), strengths, slopes)
+    return offset, strengths.reshape(squared.shape), slopes.reshape(squared.shape)
 
 
 @lean_piece

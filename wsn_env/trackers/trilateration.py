@@ -81,11 +81,8 @@ def _fit_point(cs, nodes, strengths, point, cov):
         for i in range(len(strengths)):
             dx, dy = point[0] - nodes[i, 0], point[1] - nodes[i, 1]
             squared = dx * dx + dy * dy
-            level = sensing.strength(squared, c)
-            beyond = (strengths[i] - level) / c.noise
-            slope = 0.0
-            if squared > max(c.floor_m * c.floor_m, 1e-12):
-                slope = -2.0 * c.slope / (squared * c.noise) * (1.0 if c.model == sensing.STRENGTH else level)
+            beyond = (strengths[i] - sensing.strength(squared, c)) / c.noise
+            slope = sensing.strength_slope(squared, c) / c.noise
             a += slope * slope * dx * dx
             b += slope * slope * dx * dy
             d += slope * slope * dy * dy
