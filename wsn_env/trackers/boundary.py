@@ -27,6 +27,7 @@ from wsn_env.physics.constants import constants
 from wsn_env.physics.field import squared_distance
 from wsn_env.scenario import Scenario
 from wsn_env.sections import BOUNDARY_TRACKERS
+from wsn_env.trackers.base import MomentTracker
 from wsn_env.trackers.least_squares import SINGULAR, circle_centre, scalar_update
 from wsn_env.types import Belief, Network, Reports, network_of
 
@@ -40,7 +41,7 @@ PASSES = 2  # linearisations of the ranges
 GATE_SDS = 3.0
 
 
-class BoundaryTracker:
+class BoundaryTracker(MomentTracker):
     """The trackers of this module, by the scenario's `tracker`. Their memory is the belief's mean and covariance.
 
     After a search recursive least squares knows nothing, P0 = 1e4 I; where an episode's start is not known it takes the
@@ -50,16 +51,11 @@ class BoundaryTracker:
     the target may have crossed its edge long ago. Where nodes sleep, the particle filter is the better tracker.
     """
 
-    particles = 0
-
     def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
         self._threads = threads
         self._constants = constants(scenario)
         self._variant = BOUNDARY_TRACKERS.index(scenario.tracking.tracker)
         self._at_rest = scenario.tracking.start != "known"
-
-    def start(self, keys, periods, rows, belief: Belief) -> None:
-        """Nothing to spread: mean and covariance are the whole belief."""
 
     def relocate(self, keys, periods, rows, belief: Belief) -> None:
         """Where a search has set the position of the marked rows: P0, in place."""

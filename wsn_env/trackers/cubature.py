@@ -16,26 +16,20 @@ from wsn_env.physics.constants import constants
 from wsn_env.physics.field import squared_distance
 from wsn_env.physics.motion import predict_moments
 from wsn_env.scenario import Scenario
+from wsn_env.trackers.base import MomentTracker
 from wsn_env.types import Belief, Network, Reports
 
 ITERATIONS = 5  # at most
 TOLERANCE_M = 1e-3  # a shift of the position below this ends the iteration
 
 
-class _CubatureTracker:
+class _CubatureTracker(MomentTracker):
     """Corrects with all reports of a period at once."""
 
-    particles = 0
     iterations: int
 
     def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
         self._constants, self._threads = constants(scenario), threads
-
-    def start(self, keys, periods, rows, belief: Belief) -> None:
-        """Nothing to spread: mean and covariance are the whole belief."""
-
-    def relocate(self, keys, periods, rows, belief: Belief) -> None:
-        """Nothing to move but mean and covariance."""
 
     def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
         """Predict and correct every row, in place."""

@@ -1,29 +1,22 @@
 """Trackers on a fingerprint network: its fixes alone, and a Kalman filter on them."""
 
 from wsn_env.scenario import Scenario
+from wsn_env.trackers.base import MomentTracker
 from wsn_env.trackers.fingerprint import trained_network
 from wsn_env.trackers.kalman import POSITION_ROWS, constant_velocity
 from wsn_env.types import Belief, Network, Reports
 
 
-class GRNNTracker:
+class GRNNTracker(MomentTracker):
     """The network's fix of each period's strengths, without memory.
 
     Any nodes may have reported: the network compares only what was heard. A period without a report keeps the last
     estimate, and its variance grows by (rest_sd_ms T)^2.
     """
 
-    particles = 0
-
     def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
         self._network = trained_network(scenario)
         self._growth = (scenario.tracking.rest_sd_ms * scenario.period_s) ** 2
-
-    def start(self, keys, periods, rows, belief: Belief) -> None:
-        """Nothing to spread."""
-
-    def relocate(self, keys, periods, rows, belief: Belief) -> None:
-        """Nothing to move but mean and covariance."""
 
     def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
         """Replace the estimate by the fix, in place."""
@@ -38,10 +31,8 @@ class GRNNTracker:
             belief.cov[b, ::2, ::2] = cov
 
 
-class GRNNKalmanTracker:
+class GRNNKalmanTracker(MomentTracker):
     """filterpy's KalmanFilter with the network's fixes as measurements of the position, and their spread as noise."""
-
-    particles = 0
 
     def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
         from filterpy.kalman import KalmanFilter
@@ -50,12 +41,6 @@ class GRNNKalmanTracker:
         self._filter = KalmanFilter(dim_x=4, dim_z=2)
         self._filter.F, self._filter.Q = constant_velocity(scenario)
         self._filter.H = POSITION_ROWS
-
-    def start(self, keys, periods, rows, belief: Belief) -> None:
-        """Nothing to spread: mean and covariance are the whole belief."""
-
-    def relocate(self, keys, periods, rows, belief: Belief) -> None:
-        """Nothing to move but mean and covariance."""
 
     def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
         """Predict and correct every row, in place."""

@@ -5,6 +5,7 @@ import numpy as np
 from wsn_env.physics.sensing import expected_strengths, strength_slopes
 from wsn_env.scenario import Scenario
 from wsn_env.sections import Level, Measurement, Position
+from wsn_env.trackers.base import MomentTracker
 from wsn_env.types import Belief, Network, Reports
 
 
@@ -26,14 +27,12 @@ def noise_of(measurement: Measurement) -> float:
     return measurement.noise_db if isinstance(measurement, Level) else measurement.noise
 
 
-class EKFTracker:
+class EKFTracker(MomentTracker):
     """filterpy's ExtendedKalmanFilter: each report corrects in turn, in the order of the nodes.
 
     A position report is linear, so the filter is then exact; a strength is linearised at the current mean. It keeps
     no memory but the belief, and loops over rows: its speed is filterpy's.
     """
-
-    particles = 0
 
     def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
         from filterpy.kalman import ExtendedKalmanFilter  # takes a second or two to import
@@ -41,12 +40,6 @@ class EKFTracker:
         self._measurement, self._noise = scenario.measurement, noise_of(scenario.measurement)
         self._filter = ExtendedKalmanFilter(dim_x=4, dim_z=2)
         self._filter.F, self._filter.Q = constant_velocity(scenario)
-
-    def start(self, keys, periods, rows, belief: Belief) -> None:
-        """Nothing to spread: mean and covariance are the whole belief."""
-
-    def relocate(self, keys, periods, rows, belief: Belief) -> None:
-        """Nothing to move but mean and covariance."""
 
     def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
         """Predict and correct every row, in place."""
@@ -80,14 +73,12 @@ class EKFTracker:
         return expected_strengths(*at), row
 
 
-class UKFTracker:
+class UKFTracker(MomentTracker):
     """filterpy's UnscentedKalmanFilter: 9 points (alpha = .1, beta = 2, kappa = -1), all reports at once.
 
     Van der Merwe (2004). Keeps no memory but the belief; a covariance that has lost its sign, as the negative weight
     of the central point allows, gets it back.
     """
-
-    particles = 0
 
     def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
         from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
@@ -99,12 +90,6 @@ class UKFTracker:
         )
         self._filter.Q = noise
         self._measurement, self._noise = scenario.measurement, noise_of(scenario.measurement)
-
-    def start(self, keys, periods, rows, belief: Belief) -> None:
-        """Nothing to spread: mean and covariance are the whole belief."""
-
-    def relocate(self, keys, periods, rows, belief: Belief) -> None:
-        """Nothing to move but mean and covariance."""
 
     def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
         """Predict and correct every row, in place."""

@@ -2,28 +2,21 @@
 
 from wsn_env.scenario import Scenario
 from wsn_env.sections import Position
+from wsn_env.trackers.base import MomentTracker
 from wsn_env.types import Belief, Network, Reports
 
 
-class SnapshotTracker:
+class SnapshotTracker(MomentTracker):
     """Mean of the reported positions; of the reporting nodes' own positions where only a strength is measured.
 
     A period without a report keeps the last estimate, with a variance that grows by one step of 1 m/s.
     """
-
-    particles = 0
 
     def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
         m = scenario.measurement
         self._positions_reported = isinstance(m, Position)
         self._variance = m.noise_m**2 if self._positions_reported else scenario.radius_m**2 / 2
         self._growth = scenario.period_s**2
-
-    def start(self, keys, periods, rows, belief: Belief) -> None:
-        """Nothing to spread."""
-
-    def relocate(self, keys, periods, rows, belief: Belief) -> None:
-        """Nothing to move but mean and covariance."""
 
     def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
         """Replace the estimate by the mean of the reports, in place."""

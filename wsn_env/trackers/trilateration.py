@@ -7,6 +7,7 @@ from wsn_env.physics import sensing
 from wsn_env.physics.constants import constants
 from wsn_env.scenario import Scenario
 from wsn_env.sections import Measurement, Rssi
+from wsn_env.trackers.base import MomentTracker
 from wsn_env.trackers.kalman import noise_of
 from wsn_env.types import Belief, Network, Reports
 
@@ -16,25 +17,17 @@ NEWTON_STEPS, NEWTON_END_M = 15, 1e-3
 RIDGE = 1e-6  # 1/m^2: information that keeps the step finite where the likelihood is flat
 
 
-class TrilaterationTracker:
+class TrilaterationTracker(MomentTracker):
     """Memoryless linear least squares (`trilaterate`). Needs three nodes that do not stand on one line.
 
     With fewer the last estimate stays, and its variance grows by (rest_sd_ms T)^2. What lies FARTHEST sides from the
     field or more is taken to lie there, and no sd is larger.
     """
 
-    particles = 0
-
     def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
         self._measurement, self._noise = scenario.measurement, noise_of(scenario.measurement)
         self._constants, self._side_m = constants(scenario), scenario.field.side_m
         self._growth = (scenario.tracking.rest_sd_ms * scenario.period_s) ** 2
-
-    def start(self, keys, periods, rows, belief: Belief) -> None:
-        """Nothing to spread."""
-
-    def relocate(self, keys, periods, rows, belief: Belief) -> None:
-        """Nothing to move but mean and covariance."""
 
     def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
         """Replace the estimate by the period's, in place."""
