@@ -15,10 +15,16 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import wsn_env
 from wsn_env import ClusterEnv, ClusterVectorEnv, Scenario, ScenarioError
+from wsn_env.registration import IDS
 
 ACTIONS = ("menu", "subset", "nodes", "cluster")
 OBSERVATIONS = ("candidates", "dict", "view")
 SMALL = dict(particles=64, nodes=40, side_m=50.0, crossing_m=20.0, periods=7)
+SMALL_OTHERS = {  # small enough, in a field of their own
+    "Binary-v0": dict(particles=64, nodes=100, periods=7),
+    "Anchors-v0": dict(particles=64, periods=7),
+    "Underwater-v0": dict(particles=64, nodes=36, periods=7),
+}
 
 
 def same(a, b) -> bool:
@@ -33,11 +39,10 @@ def same(a, b) -> bool:
     return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
 
 
-@pytest.mark.parametrize("scenario", ("PreDC-v0", "Rssi-v0", "Underwater-v0"))
+@pytest.mark.parametrize("scenario", IDS)
 @pytest.mark.parametrize("reward", ("error", "belief"))
 @pytest.mark.parametrize("action,observation", list(itertools.product(ACTIONS, OBSERVATIONS)))
 def test_check_env_passes_without_a_warning(scenario, action, observation, reward):
-    small = dict(particles=64, nodes=36, periods=7) if scenario == "Underwater-v0" else SMALL
     env = gym.make(
         f"wsn_env/{scenario}",
         action=action,
@@ -45,7 +50,7 @@ def test_check_env_passes_without_a_warning(scenario, action, observation, rewar
         reward=reward,
         render_mode="rgb_array",
         lam=(0.3, 30.0),
-        **small,
+        **SMALL_OTHERS.get(scenario, SMALL),
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -89,18 +94,19 @@ def test_vector_equals_single_environments(mode, observation, threads):
             assert same(*pair)
 
 
-def test_sixty_four_rows_equal_sixty_four_environments():
-    """At the paper's size, 1 and 2 threads."""
-    rows, seed = 64, 2**31 + 7
+@pytest.mark.parametrize("scenario", IDS)
+def test_sixty_four_rows_equal_sixty_four_environments(scenario):
+    """At the scenario's size, 1 and 2 threads."""
+    rows, seed, name = 64, 2**31 + 7, f"wsn_env/{scenario}"
     runs = []
     for threads in (1, 2):
-        envs = gym.make_vec("wsn_env/PreDC-v0", num_envs=rows, vectorization_mode="vector_entry_point", threads=threads)
+        envs = gym.make_vec(name, num_envs=rows, vectorization_mode="vector_entry_point", threads=threads)
         first, _ = envs.reset(seed=seed)
         rng = np.random.default_rng(0)
         runs.append([first] + [envs.step(rng.integers(0, 19, rows))[:2] for _ in range(12)])
     assert all(same(a, b) for a, b in zip(*[[x for pair in run[1:] for x in pair] for run in runs]))
     for i in range(0, rows, 9):
-        env = gym.make("wsn_env/PreDC-v0")
+        env = gym.make(name)
         observation, _ = env.reset(seed=seed + i)
         assert same(observation, runs[0][0][i])
         rng = np.random.default_rng(0)
