@@ -1,6 +1,9 @@
 # `make train` trains a scheduler and compares it, `make test` runs the tests; both set up .venv first.
 PYTHON ?= python3
-LAM ?= 4
+SCENARIO ?= PreDC-v0
+ORDER ?= nearest
+# Left out: the scenario's.
+LAM ?=
 # An index of CPU wheels of torch, where the default index would bring a CUDA build: TORCH_INDEX="--index-url URL"
 TORCH_INDEX ?=
 
@@ -11,7 +14,7 @@ READY := $(VENV)/.ready
 .PHONY: train test slow bench bench-short lint clean
 
 train: $(READY)
-	$(RUN) train.py --resume --lam $(LAM)
+	$(RUN) train.py --resume --scenario $(SCENARIO) --order $(ORDER) $(if $(LAM),--lam $(LAM))
 
 test: $(READY)
 	$(RUN) -m pytest

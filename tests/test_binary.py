@@ -162,6 +162,15 @@ def test_a_search_asks_everybody():
     assert told(state).keys() == set(np.flatnonzero(truth(state) != now))
 
 
+def test_one_bit_has_no_strength_so_that_the_head_after_a_search_tells_nothing_further():
+    """Else whoever stands nearest to the target would lead, and be seen to."""
+    state = World(scene(start="search"), threads=1).reset(np.arange(20))
+    target = state.track[:, 0, ::2]
+    away = np.linalg.norm(state.network.positions - target[:, None], axis=2)
+    for row in range(20):
+        assert state.network.head[row] == np.flatnonzero(away[row] <= 40.0)[0]
+
+
 # --- the particle filter on the bitmap ----------------------------------------------------------------------
 
 

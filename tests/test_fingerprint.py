@@ -217,6 +217,18 @@ def test_a_field_by_seed_can_be_surveyed_too():
     np.testing.assert_array_equal(state.network.positions[0], fixed_positions(scenario.field))
 
 
+@pytest.mark.parametrize("changes", [dict(tracker="grnn"), dict(tracker="ekf", start="fix")])
+def test_levels_above_a_threshold_have_fingerprints_too(changes):
+    """Sonars on a fixed grid, led by the one nearest to the target: the first fix is better than that node's place."""
+    quiet = dict(silent_information=False, resampling="systematic", search=False, periods=3)
+    world = World(Scenario.named("Underwater-v0", field_seed=0, **quiet, **changes), threads=1)
+    state = world.reset(np.arange(200))
+    away = np.linalg.norm(state.network.positions - state.track[:, :1, ::2], axis=2)
+    state, outcome = world.step(state, Cluster(away.argmin(axis=1), np.tile(np.arange(64), (200, 1))))
+    assert outcome.delivered.mean() > 4
+    assert outcome.error_m.mean() < away.min(axis=1).mean()
+
+
 @pytest.mark.parametrize("tracker", ["grnn", "grnn_kf"])
 @pytest.mark.parametrize(
     ("overrides", "says"),

@@ -277,3 +277,14 @@ def test_beacons_go_as_far_as_the_target_is_predicted_and_so_tell_nothing():
         assert outcome.spent_j[row, 3] == near(rx(128) + tx(512, way))
     _, elsewhere = talk.world.step(far, Cluster(np.zeros(2, int), np.full((2, 1), 3)))
     np.testing.assert_array_equal(elsewhere.spent_j, outcome.spent_j)
+
+
+def test_under_a_sink_a_cluster_outlives_its_head():
+    """Its head is a node like the others; with a head that receives, the cluster ends with it."""
+    for receiver, left in (("sink", (1, [2, 3])), ("head", (-1, []))):
+        talk = Talk(receiver=receiver, sensing_nj=1000.0)
+        talk.step(0, 1, 2, 3)
+        talk.state.network.battery[0, 0] = 1e-9
+        talk.step(0, 1, 2, 3)
+        network = talk.state.network
+        assert (network.head[0], network.members[0, : network.n_members[0]].tolist()) == left
