@@ -159,7 +159,7 @@ def form(head, chosen, count, state, outcome, b, c):
     """Make the chosen cluster the standing one: handover from the old head, invitations to new members.
 
     Only members that hear their invitation join. A new head invites all of them. A sink or the target calls only who
-    has slept, the head like the others, and at no expense here.
+    has slept, the head like the others; its sending is not on the books.
 
     Args:
         head: the new head, alive.
