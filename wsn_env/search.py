@@ -41,8 +41,8 @@ def search(start, stop, cs, rows, found, state, outcome):
 def _wake_all(state, outcome, b, c):
     """Wake-up call to all, sensing by those that slept.
 
-    Returns: the living node with the strongest signal of the target, which is the nearest that detects it, or the one
-    that measured the greatest strength; -1: nobody detects it.
+    Returns: the living node with the strongest signal of the target: the one that measured the greatest strength, the
+    nearest that detects it where nodes report positions, the first by number where they report one bit; -1: nobody.
     """
     network, standing = state.network, state.network.row[b]
     positions, battery, members = network.positions[b], network.battery[b], network.members[b]

@@ -126,7 +126,7 @@ def sensing_constants(detection: Detection | Threshold, measurement: Measurement
         values |= dict(level=m.at_1m_db, slope=5 * m.exponent / math.log(10), absorption=m.absorption_db_per_m)
         values |= dict(noise=m.noise_db, floor_m=m.floor_m)
     elif isinstance(m, Binary):
-        values |= dict(noise=m.edge_m, flip=m.flip, edge_m=m.edge_m, refresh=m.refresh)
+        values |= dict(flip=m.flip, edge_m=m.edge_m, refresh=m.refresh)
         values |= dict(every_presence=m.reports == "presence")
     else:
         values |= dict(level=m.amplitude, slope=m.exponent / 2, noise=m.noise, floor_m=m.floor_m)

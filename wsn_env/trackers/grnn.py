@@ -1,34 +1,22 @@
 """Trackers on a fingerprint network: its fixes alone, and a Kalman filter on them."""
 
 from wsn_env.scenario import Scenario
-from wsn_env.trackers.base import MomentTracker
+from wsn_env.trackers.base import MemorylessTracker, MomentTracker
 from wsn_env.trackers.fingerprint import trained_network
 from wsn_env.trackers.kalman import POSITION_ROWS, constant_velocity
 from wsn_env.types import Belief, Network, Reports
 
 
-class GRNNTracker(MomentTracker):
-    """The network's fix of each period's strengths, without memory.
-
-    Any nodes may have reported: the network compares only what was heard. A period without a report keeps the last
-    estimate, and its variance grows by (rest_sd_ms T)^2.
-    """
+class GRNNTracker(MemorylessTracker):
+    """The network's fix of each period's strengths. Any nodes may have reported: it compares only what was heard."""
 
     def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
+        super().__init__(scenario)
         self._network = trained_network(scenario)
-        self._growth = (scenario.tracking.rest_sd_ms * scenario.period_s) ** 2
 
-    def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
-        """Replace the estimate by the fix, in place."""
-        for b in range(len(keys)):
-            n = reports.count[b]
-            belief.mean[b, [1, 3]] = 0.0
-            if n == 0:
-                belief.cov[b, [0, 2], [0, 2]] += self._growth
-                continue
-            fix, cov = self._network.locate(reports.node[b, :n], reports.value[b, :n, 0])
-            belief.mean[b, [0, 2]], belief.cov[b] = fix, 0.0
-            belief.cov[b, ::2, ::2] = cov
+    def locate(self, nodes, places, values):
+        """The fix, if anybody reported."""
+        return self._network.locate(nodes, values[:, 0]) if len(nodes) else None
 
 
 class GRNNKalmanTracker(MomentTracker):

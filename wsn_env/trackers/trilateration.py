@@ -7,9 +7,8 @@ from wsn_env.physics import sensing
 from wsn_env.physics.constants import constants
 from wsn_env.scenario import Scenario
 from wsn_env.sections import Measurement, Rssi
-from wsn_env.trackers.base import MomentTracker
+from wsn_env.trackers.base import MemorylessTracker
 from wsn_env.trackers.kalman import noise_of
-from wsn_env.types import Belief, Network, Reports
 
 ON_A_LINE = 1e-6  # nodes whose squared extents differ by more than this factor fix no point
 FARTHEST = 10  # sides
@@ -17,50 +16,40 @@ NEWTON_STEPS, NEWTON_END_M = 15, 1e-3
 RIDGE = 1e-6  # 1/m^2: information that keeps the step finite where the likelihood is flat
 
 
-class TrilaterationTracker(MomentTracker):
-    """Memoryless linear least squares (`trilaterate`). Needs three nodes that do not stand on one line.
+class TrilaterationTracker(MemorylessTracker):
+    """Linear least squares (`trilaterate`). Needs three nodes that do not stand on one line.
 
-    With fewer the last estimate stays, and its variance grows by (rest_sd_ms T)^2. What lies FARTHEST sides from the
-    field or more is taken to lie there, and no sd is larger.
+    What lies FARTHEST sides from the field or more is taken to lie there, and no sd is larger.
     """
 
     def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
+        super().__init__(scenario)
         self._measurement, self._noise = scenario.measurement, noise_of(scenario.measurement)
         self._constants, self._side_m = constants(scenario), scenario.field.side_m
-        self._growth = (scenario.tracking.rest_sd_ms * scenario.period_s) ** 2
 
-    def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
-        """Replace the estimate by the period's, in place."""
-        for b in range(len(keys)):
-            n = reports.count[b]
-            nodes = network.positions[b, reports.node[b, :n]]
-            found = self._locate(nodes, reports.value[b, :n, 0])
-            belief.mean[b, [1, 3]] = 0.0
-            if found is None:
-                belief.cov[b, [0, 2], [0, 2]] += self._growth
-            else:
-                far, cov = FARTHEST * self._side_m, found[1]
-                belief.mean[b, [0, 2]] = np.clip(found[0], -far, self._side_m + far)
-                belief.cov[b] = 0.0
-                belief.cov[b, ::2, ::2] = cov * min(1.0, far**2 / max(np.trace(cov), 1e-300))
-
-    def _locate(self, nodes, strengths):
-        squared, sd = squared_ranges(strengths, self._measurement, self._noise, FARTHEST * self._side_m)
-        return trilaterate(nodes, squared, sd)
+    def locate(self, nodes, places, values):
+        """The solution, if there is one."""
+        far = FARTHEST * self._side_m
+        found = trilaterate(places, *squared_ranges(values[:, 0], self._measurement, self._noise, far))
+        if found is None:
+            return None
+        point, cov = found
+        return np.clip(point, -far, self._side_m + far), cov * min(1.0, far**2 / max(np.trace(cov), 1e-300))
 
 
 class NonlinearLSTracker(TrilaterationTracker):
-    """Memoryless maximum likelihood: Gauss and Newton's iteration on the strengths, from the linear solution.
+    """Maximum likelihood: Gauss and Newton's iteration on the strengths, from the linear solution.
 
     The estimate stays within a tenth of the side about the field, and so does each step's length.
     """
 
-    def _locate(self, nodes, strengths):
-        rough = super()._locate(nodes, strengths)
+    def locate(self, nodes, places, values):
+        """The solution, where there is a linear one."""
+        rough = super().locate(nodes, places, values)
         if rough is None:
             return None
         point, cov = np.clip(rough[0], 0.0, self._side_m), np.empty((2, 2))
-        _fit_point(self._constants, nodes, np.ascontiguousarray(strengths), point, cov)
+        _fit_point(self._constants, places, values[:, 0].copy(), point, cov)
         return point, cov
 
 
