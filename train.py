@@ -1,8 +1,8 @@
-"""Train a PPO scheduler, then compare it with every baseline on episodes that neither has seen.
+"""Train one PPO scheduler for every trade-off, then compare it with every baseline on episodes that neither has seen.
 
-    python train.py --scenario PreDC-v0 --lam 4
+    python train.py --scenario PreDC-v0
 
-Reads top to bottom: settings -> environment -> PPO -> saved policy -> paired comparison -> picture.
+Reads top to bottom: settings -> environments -> PPO -> saved policy -> paired comparison -> picture.
 """
 
 from __future__ import annotations
@@ -23,16 +23,20 @@ from stable_baselines3.common.logger import configure
 from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecMonitor
 
-from agents.ppo import PPOPolicy, network_of, save_policy
-from agents.sb3 import SB3VecEnv
-from wsn_env.cli import make_scenario
+from agents.actor_critic import EntryPolicy, network_of
+from agents.ppo import PPOPolicy, save_policy
+from agents.sb3 import SB3Fleet, SB3VecEnv
+from wsn_env.cli import make_scenario, parse_overrides
 from wsn_env.evaluation import FIRST_SEED, evaluate, evaluation_seeds, forget_blocks, versions
 from wsn_env.files import replacing
 from wsn_env.interface import Settings
+from wsn_env.interface.features import BELIEF_FEATURES, CANDIDATE_FEATURES
+from wsn_env.interface.prospects import ENTRY_FEATURES
 from wsn_env.policies import make_policy, policy_names
 from wsn_env.progress import progress_bar
 from wsn_env.quantity import check_quantity
 from wsn_env.reports import draw_front, print_tables, save_markdown
+from wsn_env.scenario import Scenario
 from wsn_env.vector_env import ClusterVectorEnv
 
 
@@ -43,14 +47,20 @@ class Training:
     # what is trained
     scenario: str = "PreDC-v0"
     """Scenario id."""
-    lam: float | None = None
-    """Trade-off between error and energy [m/mJ]; left out: the scenario's."""
+    lam: list[float] = field(default_factory=list)
+    """Trade-off between error and energy [m/mJ]: one number, or two that it is drawn between, log-uniformly for each
+    episode; left out: the scenario's whole span."""
     tracks: list[Path] = field(default_factory=list)
     """CSV files of recorded motion (columns t, x, y in s and m), to train and compare on instead of the scenario's."""
     set: list[str] = field(default_factory=list)
     """Scenario quantities, as name=value: nodes=400 particles=1000."""
-    order: str = "nearest"
-    """The menu's order of merit: nearest | information | value."""
+    vary: list[str] = field(default_factory=list)
+    """Further scenarios to train in, each this one with some quantities changed: nodes=81 motion=turns,particles=1000.
+    The rows are dealt evenly among all."""
+    action: str = "menu"
+    """What it chooses from: menu | subset."""
+    order: str | None = None
+    """The menu's order of merit: nearest | information | value; left out: by what the nodes measure."""
     reward: str = "belief"
     """Training reward: belief (what the filter expects, low variance) | error (the true error)."""
 
@@ -82,8 +92,13 @@ class Training:
     """Of the generalised advantage estimate."""
     entropy: float = 5e-4
     """Weight of the entropy bonus."""
-    network: tuple[int, int] = (64, 64)
-    """Units of the two hidden layers."""
+    network: str = "entries"
+    """entries: the same small network scores every entry of the choice, whatever their number; flat: one network of
+    the whole observation."""
+    units: tuple[int, int] = (32, 32)
+    """Units of its two hidden layers."""
+    critic: tuple[int, int] = (64, 64)
+    """Units of the two hidden layers of the value's network."""
     seed: int = 0
     """Of training, below 2^31 - steps - rows; evaluation seeds lie above."""
     torch_threads: int = 1
@@ -101,7 +116,8 @@ class Training:
     @property
     def folder(self) -> Path:
         """Where everything of this run goes."""
-        return self.runs / (self.name or f"{self.scenario}-lam{self.lam:g}")
+        single = f"-lam{self.lam[0]:g}" if len(self.lam) == 1 else ""
+        return self.runs / (self.name or self.scenario + single)
 
 
 def main() -> int:
@@ -120,16 +136,18 @@ def main() -> int:
 
 def train(settings: Training) -> None:
     """The whole story."""
-    if settings.lam is None:
-        settings.lam = make_scenario(settings.scenario, settings.set, settings.tracks).lam_range[0]
+    scenario = complete(settings)
     check(settings)
     torch.set_num_threads(settings.torch_threads)
-    scenario = make_scenario(settings.scenario, settings.set, settings.tracks, lam=settings.lam)
-    speaks = Settings(reward=settings.reward, order=settings.order)
-    envs = ClusterVectorEnv(settings.rows, scenario, autoreset_mode="Disabled", **asdict(speaks))
+    speaks = Settings(
+        action=settings.action,
+        observation="menu" if settings.action == "menu" else "candidates",
+        reward=settings.reward,
+        order=settings.order,
+    )
+    envs = make_envs(settings, scenario, speaks)
     folder = open_folder(settings)
-    adapted = SB3VecEnv(envs, scaled=True, stagger=True)
-    model = make_model(settings, VecMonitor(adapted), folder)
+    model = make_model(settings, VecMonitor(envs), folder)
     left = settings.steps - model.num_timesteps
     if left > 0:
         started, busy = time.perf_counter(), time.process_time()
@@ -143,7 +161,7 @@ def train(settings: Training) -> None:
         seconds = time.perf_counter() - started
         print(
             f"trained {left:,} periods in {seconds:.0f} s ({left / seconds:,.0f} a second), "
-            f"{100 * adapted.seconds / seconds:.0f} % of it in the environment, "
+            f"{100 * envs.seconds / seconds:.0f} % of it in the environment, "
             f"{(time.process_time() - busy) / seconds:.1f} cores busy"
         )
 
@@ -154,14 +172,43 @@ def train(settings: Training) -> None:
         compare(settings, scenario, policy)
 
 
+def complete(settings: Training) -> Scenario:
+    """Fill in what was left out, by scenario, and return that."""
+    scenario = make_scenario(settings.scenario, settings.set, settings.tracks)
+    settings.lam = settings.lam or list(scenario.lam_span)
+    if len(settings.lam) > 2:
+        raise ValueError(f"train.py: lam = {settings.lam}: must be one number, or two that it is drawn between")
+    if settings.order is None:
+        settings.order = "value" if scenario.binary else "nearest" if scenario.locates else "information"
+    return scenario.override(lam=settings.lam[0] if len(settings.lam) == 1 else tuple(settings.lam))
+
+
+def make_envs(settings: Training, scenario: Scenario, speaks: Settings) -> SB3Fleet:
+    """The rows, dealt among the scenarios."""
+    scenarios = [scenario, *(scenario.override(**parse_overrides(text.split(","))) for text in settings.vary)]
+    shares = np.diff(np.arange(len(scenarios) + 1) * settings.rows // len(scenarios))
+    believed = settings.reward == "belief"
+    parts = []
+    for one, rows in zip(scenarios, shares):
+        envs = ClusterVectorEnv(int(rows), one, autoreset_mode="Disabled", **asdict(speaks))
+        parts.append(SB3VecEnv(envs, scaled=True, stagger=True, calibrated=believed))
+    return SB3Fleet(parts)
+
+
 def check(settings: Training) -> None:
     """Refuse now what would fail after the training."""
     for name in "steps rows rollout batch epochs torch_threads checkpoint_steps".split():
         check_quantity("train.py", name, getattr(settings, name), at_least=1, whole=True)
     for name in ("gamma", "gae_lambda"):
         check_quantity("train.py", name, getattr(settings, name), at_least=0, at_most=1)
-    for units in settings.network:
-        check_quantity("train.py", "network", units, at_least=1, whole=True)
+    for name in ("units", "critic"):
+        for units in getattr(settings, name):
+            check_quantity("train.py", name, units, at_least=1, whole=True)
+    for name, allowed in (("network", ("entries", "flat")), ("action", ("menu", "subset"))):
+        if getattr(settings, name) not in allowed:
+            raise ValueError(f"train.py: {name} = {getattr(settings, name)!r}: must be one of {', '.join(allowed)}")
+    if settings.rows <= len(settings.vary):
+        raise ValueError(f"train.py: rows = {settings.rows}: must be at least {1 + len(settings.vary)}, one a scenario")
     # Every seed that training may use lies below those of evaluations.
     most = FIRST_SEED - settings.steps - settings.rows
     check_quantity("train.py", "seed", settings.seed, at_least=0, at_most=most, whole=True)
@@ -204,8 +251,9 @@ def make_model(settings: Training, envs, folder: Path) -> PPO:
             raise ValueError(f"{path} is cut short or no checkpoint: remove it to begin anew ({problem!r})") from None
         envs.seed(settings.seed + model.num_timesteps)  # other episodes than before
         return model
+    kind, shape = architecture(settings, envs)
     return PPO(
-        "MlpPolicy",
+        kind,
         envs,
         n_steps=settings.rollout,
         batch_size=settings.batch,
@@ -214,10 +262,26 @@ def make_model(settings: Training, envs, folder: Path) -> PPO:
         gamma=settings.gamma,
         gae_lambda=settings.gae_lambda,
         ent_coef=settings.entropy,
-        policy_kwargs={"net_arch": list(settings.network)},
+        policy_kwargs=shape,
         seed=settings.seed,
         device="cpu",
     )
+
+
+def architecture(settings: Training, envs) -> tuple:
+    """The kind of PPO's policy, and its arguments."""
+    if settings.network == "flat":
+        return "MlpPolicy", {"net_arch": {"pi": list(settings.units), "vf": list(settings.critic)}}
+    menu = settings.action == "menu"
+    entries = dict(
+        belief=len(BELIEF_FEATURES),
+        entry=len(ENTRY_FEATURES if menu else CANDIDATE_FEATURES),
+        observation=envs.observation_space.shape[0],
+        outputs=1 if menu else 2,
+        actor=settings.units,
+        critic=settings.critic,
+    )
+    return EntryPolicy, {"entries": entries}
 
 
 def save_checkpoint(model: PPO, folder: Path) -> None:
@@ -249,19 +313,20 @@ class Watch(BaseCallback):
 
 
 def compare(settings: Training, scenario, policy: Path) -> None:
-    """Paired comparison with every baseline at the trained lam: table, CSV, JSON, picture."""
+    """Paired comparison with every baseline: table, CSV, JSON, picture."""
     folder = settings.folder
+    lams = settings.lam if len(settings.lam) == 1 else scenario.lam_sweep
     policies = {"ppo": PPOPolicy(scenario, path=str(policy))}
     policies |= {name: make_policy(name, scenario) for name in policy_names() if name != "ppo"}
     with progress_bar() as report:
         evaluation = evaluate(
-            policies, scenario, None, settings.episodes, settings.evaluation_seed, keep=folder, progress=report
+            policies, scenario, lams, settings.episodes, settings.evaluation_seed, keep=folder, progress=report
         )
     evaluation.save(folder)
     save_markdown(evaluation, folder)
     forget_blocks(folder)
     print_tables(evaluation, reference="ppo")
-    draw_front(evaluation, settings.lam, folder / "comparison.png", emphasis="ppo")
+    draw_front(evaluation, lams[len(lams) // 2], folder / "comparison.png", emphasis="ppo")
     print(f"written: {folder / 'evaluation.csv'}, {folder / 'comparison.png'}")
 
 

@@ -1,4 +1,7 @@
-"""A trained PPO scheduler as a policy: policy.json says how it sees and acts, policy.safetensors holds its network."""
+"""A trained PPO scheduler as a policy: policy.json says how it sees and acts, policy.safetensors holds its network.
+
+Trained ones come with the package for the scenarios in `pretrained/`; its README says how each was made.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,9 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
+from gymnasium.spaces import Discrete
+
 from agents.base import ViewPolicy
 from agents.network import Network
 from wsn_env.files import replacing
@@ -15,44 +21,57 @@ from wsn_env.interface import Interface, Settings
 from wsn_env.types import Cluster
 from wsn_env.view import View
 
+PRETRAINED = Path(__file__).parent / "pretrained"
+SPOKEN = (("menu", "menu"), ("menu", "candidates"), ("subset", "candidates"))
+
 
 @dataclass(frozen=True, repr=False)
 class PPOPolicy(ViewPolicy):
-    """Takes the most probable action of the network that `train.py` saved at `path` (a policy.json)."""
+    """Takes the most probable action of the network that `train.py` saved at `path` (a policy.json); left out: of the
+    one that comes with the package for the scenario of this name."""
 
     path: str = ""
 
     def __repr__(self):
         """Tells it from others by what it has learned."""
-        weights = b"".join(array.tobytes() for layer in self._parts[1].layers for array in layer)
+        weights = b"".join(array.tobytes() for array in self._parts[1].arrays.values())
         return f"PPOPolicy({self.path!r}, weights {hashlib.sha256(weights).hexdigest()[:16]})"
 
     @cached_property
     def _parts(self) -> tuple[Interface, Network]:
-        if not self.path:
-            raise ValueError("policy 'ppo' is learned: name the policy.json that train.py saved instead")
-        path = Path(self.path)
+        path = Path(self.path or PRETRAINED / self.scenario.name / "policy.json")
+        if not self.path and not path.exists():
+            shipped = ", ".join(sorted(folder.name for folder in PRETRAINED.iterdir() if folder.is_dir()))
+            raise ValueError(
+                f"policy 'ppo': none comes with the package for {self.scenario.name}, only for {shipped}: train one"
+                " with train.py and name its policy.json"
+            )
         try:
             saved = json.loads(path.read_text())
             settings = Settings(**saved["interface"])
-            if (settings.action, settings.observation) != ("menu", "candidates"):
-                raise ValueError(f"{path}: speaks {settings}: must be action menu, observation candidates")
+            if (settings.action, settings.observation) not in SPOKEN:
+                raise ValueError(f"{path}: speaks {settings}: must be of {SPOKEN} (action, observation)")
             interface = Interface(self.scenario, settings)
         except (OSError, KeyError, TypeError, UnicodeDecodeError) as problem:
             raise ValueError(f"{path} is not a saved policy: {problem!r}") from None
         network = Network.load(path.with_suffix(".safetensors"))
-        wanted = interface.observation.space.shape[0], interface.action.space.n
-        if (network.inputs, network.outputs) != wanted:
-            raise ValueError(
-                f"{path}: its network maps {network.inputs} numbers to {network.outputs}, the environment {wanted}"
-            )
+        inputs, logits = interface.observation.space.shape[0], sum(_choices(interface.action.space))
+        if not network.fits(inputs, logits):
+            raise ValueError(f"{path}: its network does not map {inputs} numbers to {logits}, as the environment wants")
         return interface, network
 
     def act(self, view: View) -> Cluster:
-        """The most probable entry of the menu, for every row."""
+        """The most probable action, for every row."""
         interface, network = self._parts
         logits = network.logits(interface.observation.encode(view))
-        return interface.action.cluster(logits.argmax(axis=1), view)
+        ends = np.cumsum(_choices(interface.action.space))[:-1]
+        best = np.stack([part.argmax(axis=1) for part in np.split(logits, ends, axis=1)], axis=1)
+        return interface.action.cluster(best.reshape(len(best), *interface.action.space.shape), view)
+
+
+def _choices(space) -> list[int]:
+    """How many logits each component of an action has."""
+    return [space.n] if isinstance(space, Discrete) else list(space.nvec)
 
 
 def save_policy(folder: str | Path, network: Network, settings: Settings, facts: dict) -> Path:
@@ -72,10 +91,3 @@ def save_policy(folder: str | Path, network: Network, settings: Settings, facts:
     with replacing(folder / "policy.json") as path:
         path.write_text(json.dumps({"kind": "ppo", "interface": asdict(settings)} | facts, indent=1))
     return folder / "policy.json"
-
-
-def network_of(model) -> Network:
-    """The actor of a stable-baselines3 PPO model with two tanh layers."""
-    policy = model.policy
-    linear = [m for m in [*policy.mlp_extractor.policy_net, policy.action_net] if hasattr(m, "weight")]
-    return Network([(m.weight.detach().cpu().numpy().T, m.bias.detach().cpu().numpy()) for m in linear])

@@ -1,8 +1,9 @@
-"""The native vector environment as a stable-baselines3 VecEnv."""
+"""The native vector environment, or several of them, as a stable-baselines3 VecEnv."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -22,19 +23,25 @@ class SB3VecEnv(VecEnv):
         envs: in same-step or disabled autoreset mode. Next-step's extra reset row is no transition: it is refused.
         scaled: rewards are divided by the cost of a period that the scenario calls typical, so that their size is
             alike for every scenario and lam.
+        calibrated: the part of the reward that stands for the error is multiplied by the ratio of all true errors so
+            far to it, so that a believed error costs on average what the true one does: filters believe too little or
+            too much of themselves.
         stagger: let the rows' first episodes end early, evenly spread, as truncations: later resets stay spread.
             Disabled mode only.
     """
 
-    def __init__(self, envs: ClusterVectorEnv, scaled: bool = False, stagger: bool = False):
+    def __init__(self, envs: ClusterVectorEnv, scaled: bool = False, stagger: bool = False, calibrated: bool = False):
         if envs.autoreset_mode == AutoresetMode.NEXT_STEP:
             raise ValueError("autoreset_mode NextStep makes rows that are no transitions: use SameStep or Disabled")
+        if calibrated and envs.autoreset_mode != AutoresetMode.DISABLED:
+            raise ValueError("calibrated=True needs autoreset_mode Disabled")
         if stagger and envs.autoreset_mode != AutoresetMode.DISABLED:
             raise ValueError("stagger=True needs autoreset_mode Disabled")
         self.envs = envs
         self.seconds = 0.0  # wall time spent in step and reset
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
-        self._scaled = scaled
+        self._scaled, self._calibrated = scaled, calibrated
+        self._errors = np.zeros(2)  # sums of true errors and of what the rewards took for them
         self._first_end = np.full(envs.num_envs, -1)
         if stagger:
             self._first_end = 1 + np.arange(envs.num_envs) * envs.scenario.periods // envs.num_envs
@@ -78,8 +85,15 @@ class SB3VecEnv(VecEnv):
                 infos[i]["TimeLimit.truncated"] = bool(truncated[i] and not terminated[i])
             if not same_step:
                 observation, _ = self.envs.reset(options={"reset_mask": done})
+        if self._calibrated:
+            rewards = self._calibrate(rewards, info)
         # A copy in float32: stable-baselines3 adds the bootstrapped value in place.
         return observation, (rewards / self._scale(lam)).astype(np.float32), done, infos
+
+    def _calibrate(self, rewards: np.ndarray, info: dict) -> np.ndarray:
+        self._errors += info["error_m"].sum(), -info["reward_error"].sum()
+        ratio = self._errors[0] / self._errors[1] if self._errors[1] > 0 else 1.0
+        return rewards + (ratio - 1.0) * info["reward_error"]
 
     def _scale(self, lam: np.ndarray) -> np.ndarray:
         scenario = self.envs.scenario
@@ -114,6 +128,87 @@ class SB3VecEnv(VecEnv):
     def get_images(self):
         """Frames of all rows."""
         return self.envs.render()
+
+
+class SB3Fleet(VecEnv):
+    """Several SB3VecEnv as one, their rows one after the other: a training meets many scenarios at once.
+
+    Args:
+        parts: of the same spaces.
+    """
+
+    def __init__(self, parts: Sequence[SB3VecEnv]):
+        first = parts[0]
+        for part in parts:
+            if (part.observation_space, part.action_space) != (first.observation_space, first.action_space):
+                raise ValueError(
+                    f"spaces differ: {part.observation_space}, {part.action_space} of {part.envs.scenario.name} and"
+                    f" {first.observation_space}, {first.action_space}"
+                )
+        self.parts = list(parts)
+        super().__init__(sum(part.num_envs for part in parts), first.observation_space, first.action_space)
+        self._ends = np.cumsum([part.num_envs for part in parts])
+
+    @property
+    def seconds(self) -> float:
+        """Wall time spent in step and reset."""
+        return sum(part.seconds for part in self.parts)
+
+    def seed(self, seed: int | None = None):
+        """Row i of all gets seed + i."""
+        starts = [0, *self._ends[:-1]]
+        return [
+            one for part, at in zip(self.parts, starts) for one in part.seed(None if seed is None else seed + int(at))
+        ]
+
+    def reset(self):
+        """New episodes in all rows."""
+        observations = [part.reset() for part in self.parts]
+        self.reset_infos = [info for part in self.parts for info in part.reset_infos]
+        return np.concatenate(observations)
+
+    def step_async(self, actions) -> None:
+        """Remember the actions."""
+        for part, own in zip(self.parts, np.split(actions, self._ends[:-1])):
+            part.step_async(own)
+
+    def step_wait(self):
+        """One period of every part."""
+        observations, rewards, dones, infos = zip(*(part.step_wait() for part in self.parts))
+        return np.concatenate(observations), np.concatenate(rewards), np.concatenate(dones), sum(infos, [])
+
+    def close(self) -> None:
+        """Close all."""
+        for part in self.parts:
+            part.close()
+
+    def get_attr(self, attr_name: str, indices=None) -> list[Any]:
+        """An attribute of the parts, once for each row."""
+        values = [value for part in self.parts for value in part.get_attr(attr_name)]
+        return [values[i] for i in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices=None) -> None:
+        """Refused, as by the parts."""
+        self.parts[0].set_attr(attr_name, value)
+
+    def env_method(self, method_name: str, *method_args, indices=None, **method_kwargs) -> list[Any]:
+        """Call a batched method of every part, and slice the answers."""
+        answers = [
+            answer for part in self.parts for answer in part.env_method(method_name, *method_args, **method_kwargs)
+        ]
+        return [answers[i] for i in self._get_indices(indices)]
+
+    def env_is_wrapped(self, wrapper_class, indices=None) -> list[bool]:
+        """Rows are never wrapped one by one."""
+        return [False for _ in self._get_indices(indices)]
+
+    def has_attr(self, attr_name: str) -> bool:
+        """Whether the parts have the attribute."""
+        return self.parts[0].has_attr(attr_name)
+
+    def get_images(self):
+        """Frames of all rows."""
+        return [image for part in self.parts for image in part.get_images()]
 
 
 def _row(arrays, i: int):

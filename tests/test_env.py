@@ -162,7 +162,7 @@ def test_belief_reward_turns_to_the_error_when_the_belief_is_wrong():
     for _ in range(30):
         _, reward, *_, info = env.step(10)
         wrong = info["error_m"] > 3 * info["posterior_rms_m"]
-        assert -reward == pytest.approx(info["error_m"] if wrong else info["posterior_rms_m"])
+        assert -reward == pytest.approx(info["error_m"] if wrong else info["believed_error_m"])
         kinds.add(wrong)
     assert kinds == {True, False}
 
@@ -210,12 +210,38 @@ def test_dead_choices_are_masked_dropped_and_counted():
     assert info["alive"] < SMALL["nodes"]
 
 
-@pytest.mark.parametrize("action", ACTIONS)
+@pytest.mark.parametrize("action", ["menu", "subset", "nodes", "cluster"])
 def test_masks_fit_the_action(action):
     envs = ClusterVectorEnv(3, action=action, **SMALL)
     envs.reset(seed=0)
     size = gym.spaces.flatdim(envs.single_action_space)
     assert envs.action_masks().shape == (3, size) and envs.action_masks().any(axis=1).all()
+
+
+def test_a_radius_names_who_is_within_it():
+    env = ClusterEnv(action="radius", observation="view", **SMALL)
+    observation, _ = env.reset(seed=0)
+    for radius in (0.0, 0.3, 1.0):
+        distance = np.hypot(*(observation["positions"] - observation["predicted_mean"][::2]).T)
+        within = set(np.flatnonzero(distance <= radius * 2 * env.scenario.radius_m)) & set(np.argsort(distance)[:12])
+        observation, *_ = env.step(np.array([radius], np.float32))
+        assert set(np.flatnonzero(observation["member"])) == within | {observation["head"]}
+    with pytest.raises(AttributeError, match="no masks"):
+        env.action_masks()
+
+
+def test_scores_name_members_and_the_head():
+    env = ClusterEnv(action="scores", observation="view", **SMALL)
+    observation, _ = env.reset(seed=0)
+    distance = np.hypot(*(observation["positions"] - observation["predicted_mean"][::2]).T)
+    nearest = np.argsort(distance)[:12]
+    scores = np.full(12, -0.5, np.float32)
+    scores[[1, 4, 7]] = 0.2, 0.9, 0.1
+    observation, *_ = env.step(scores)
+    assert observation["head"] == nearest[4]
+    assert set(np.flatnonzero(observation["member"])) == set(nearest[[1, 4, 7]])
+    observation, *_ = env.step(np.full(12, -1.0, np.float32))  # nobody above 0: the head alone
+    assert observation["member"].sum() == 1
 
 
 def test_environments_survive_pickle_and_deepcopy():
@@ -262,7 +288,16 @@ def test_bad_keywords_name_themselves(keywords, words):
 
 
 @pytest.mark.parametrize(
-    "action,bad", [("menu", 19), ("menu", -1), ("subset", np.full(13, 2)), ("nodes", np.zeros(3, int))]
+    "action,bad",
+    [
+        ("menu", 19),
+        ("menu", -1),
+        ("subset", np.full(13, 2)),
+        ("nodes", np.zeros(3, int)),
+        ("radius", np.array([1.5])),
+        ("radius", np.array([np.nan])),
+        ("scores", np.zeros(3)),
+    ],
 )
 def test_bad_actions_name_the_space(action, bad):
     env = ClusterEnv(action=action, **SMALL)

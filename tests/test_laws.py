@@ -139,6 +139,8 @@ def test_the_truth_does_not_show(scenario, seed):
         for action, observation, order in [
             ("menu", "candidates", "nearest"),
             ("menu", "dict", "information"),
+            ("menu", "menu", "nearest"),
+            ("menu", "menu", "value"),
             ("subset", "view", "nearest"),
             ("nodes", "view", "nearest"),
         ]

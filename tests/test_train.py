@@ -11,8 +11,9 @@ import pytest
 import torch
 
 import train
-from agents.network import Network
-from agents.ppo import PPOPolicy, network_of
+from agents.actor_critic import network_of
+from agents.network import EntryNetwork, Network
+from agents.ppo import PPOPolicy
 from wsn_env import ClusterVectorEnv, Scenario, View, make_policy
 from wsn_env.cli import parse_overrides
 
@@ -44,9 +45,9 @@ def test_the_saved_policy_is_the_trained_one_without_torch(run):
 
     model = PPO.load(run / "checkpoint.zip")
     network = Network.load(run / "policy.safetensors")
-    assert all(np.array_equal(a, b) for x, y in zip(network.layers, network_of(model).layers) for a, b in zip(x, y))
+    assert all(np.array_equal(array, network_of(model).arrays[name]) for name, array in network.arrays.items())
     scenario = Scenario.named("PreDC-v0", **parse_overrides(SET))
-    envs = ClusterVectorEnv(16, scenario)
+    envs = ClusterVectorEnv(16, scenario, observation="menu")
     observation, _ = envs.reset(seed=0)
     with torch.no_grad():
         wanted = model.policy.get_distribution(torch.as_tensor(observation)).distribution.logits.numpy()
@@ -115,7 +116,16 @@ def test_damaged_files_say_so(run, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "bad", [dict(rollout=0), dict(steps=0), dict(gamma=2.0), dict(seed=2**31), dict(episodes=-1), dict(network=(0, 8))]
+    "bad",
+    [
+        dict(rollout=0),
+        dict(steps=0),
+        dict(gamma=2.0),
+        dict(seed=2**31),
+        dict(episodes=-1),
+        dict(units=(0, 8)),
+        dict(network="deep"),
+    ],
 )
 def test_bad_settings_are_refused_before_anything_is_done(bad, tmp_path):
     with pytest.raises(ValueError, match=next(iter(bad))):
@@ -132,15 +142,16 @@ def test_a_mistyped_run_leaves_no_trap(tmp_path):
 def test_saved_policies_are_checked(run, tmp_path):
     scenario = Scenario.named("PreDC-v0", **parse_overrides(SET))
     network = Network.load(run / "policy.safetensors")
-    broken = [(w * np.nan, b) for w, b in network.layers]
     with pytest.raises(ValueError, match="finite"):
-        Network(broken)
+        EntryNetwork(network.arrays | {"belief.bias": np.full(32, np.nan)})
+    with pytest.raises(ValueError, match="does not fit"):
+        EntryNetwork(network.arrays | {"belief.bias": np.zeros(31)})
     for kind in ("pre_dc", 5, "nothing"):
         (tmp_path / "policy.json").write_text(json.dumps({"kind": kind}))
         with pytest.raises(ValueError, match="not a saved policy"):
             make_policy(str(tmp_path), scenario)
-    with pytest.raises(ValueError, match="name the policy.json"):
-        make_policy("ppo", scenario).act(None)
+    with pytest.raises(ValueError, match="none comes with the package for Anchors-v0"):
+        make_policy("ppo", Scenario.named("Anchors-v0")).act(None)
 
 
 def test_help_explains_every_setting():

@@ -4,6 +4,7 @@ import numpy as np
 
 from wsn_env import draws
 from wsn_env.compiling import kernel, lean_kernel, lean_piece
+from wsn_env.numerics import expected_error
 from wsn_env.physics import radio, sensing
 from wsn_env.physics.field import nearest_living, squared_distance
 from wsn_env.physics.motion import predict_moments
@@ -275,6 +276,7 @@ def _settle(state, outcome, b, c):
     out.estimate_m[0], out.estimate_m[1] = mean[0], mean[2]
     out.error_m = np.sqrt((mean[0] - target[0]) ** 2 + (mean[2] - target[1]) ** 2)
     out.posterior_rms_m = np.sqrt(cov[0, 0] + cov[2, 2])
+    out.believed_error_m = expected_error(cov[0, 0], cov[0, 2], cov[2, 2])
     out.n_eff = belief.n_eff
     out.delivered = state.reports.count[b]
     out.alive = state.network.row[b].alive

@@ -56,7 +56,7 @@ class Scenario(Section):
     period_s: float = quantity(1.0, "sampling period T", above=0, at_most=3600)
     lam: float | tuple[float, float] = 4.0  # m/mJ; a pair (low, high): drawn log-uniformly for each episode
     typical_error_m: float = quantity(1.0, "error of a good schedule: the scale of a learner's rewards", above=0)
-    typical_energy_mj: float = quantity(0.3, "its energy in a period", at_least=0)
+    typical_energy_mj: float = quantity(0.3, "its energy in a period", above=0)
     field: Field = Field()
     motion: Motion = Crossing()
     detection: Detection | Threshold = Detection()
@@ -119,6 +119,24 @@ class Scenario(Section):
         if len(pair) != 2 or any(isinstance(x, bool) or not isinstance(x, NUMBERS) for x in pair):
             raise ScenarioError(f"Scenario.lam = {self.lam!r}: must be a number of m/mJ or a pair of them")
         return float(pair[0]), float(pair[1])
+
+    @property
+    def lam_span(self) -> tuple[float, float]:
+        """The trade-offs that matter [m/mJ]: from a tenth to ten times of what makes the typical error and the typical
+        energy cost the same, a little less (0.3 to 30 for PreDC-v0)."""
+        even = self.typical_error_m / self.typical_energy_mj
+        return round(0.09 * even, 12), round(9 * even, 12)
+
+    @property
+    def lam_sweep(self) -> tuple[float, ...]:
+        """Octaves in `lam_span`, to compare at (0.5, 1, .. 16 for PreDC-v0)."""
+        even = self.typical_error_m / self.typical_energy_mj
+        return tuple(float(f"{0.15 * 2**k * even:.3g}") for k in range(6))
+
+    @property
+    def locates(self) -> bool:
+        """Whether a node reports where the target is, not only how strong its signal."""
+        return isinstance(self.measurement, Position)
 
     @property
     def binary(self) -> bool:

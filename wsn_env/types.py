@@ -256,6 +256,7 @@ OUTCOME = np.dtype(
         ("resampled", "?"),
         ("n_eff", "f8"),
         ("posterior_rms_m", "f8"),  # sqrt(trace of the belief's position covariance)
+        ("believed_error_m", "f8"),  # the error that the belief expects
         ("alive", "i8"),  # living nodes after the period
         ("target_m", "f8", 2),  # the truth
         ("estimate_m", "f8", 2),

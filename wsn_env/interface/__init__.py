@@ -24,5 +24,7 @@ class Interface:
 
     def __init__(self, scenario: Scenario, settings: Settings, threads: int = 1):
         self.action = make_action(settings.action, scenario, settings.order, settings.candidates)
-        self.observation = make_observation(settings.observation, scenario, settings.candidates, threads)
+        self.observation = make_observation(
+            settings.observation, scenario, settings.order, settings.candidates, threads
+        )
         self.reward = make_reward(settings.reward)

@@ -15,6 +15,7 @@ from wsn_env.types import KEEP_CLUSTER, Cluster
 from wsn_env.view import View
 
 MENU_MEMBERS = 8  # the menu's largest number of further members
+MENU_ENTRIES = 1 + 2 * (MENU_MEMBERS + 1)
 
 
 class MenuAction:
@@ -24,7 +25,7 @@ class MenuAction:
     def __init__(self, scenario: Scenario, order: str, candidates: int):
         if candidates <= MENU_MEMBERS:
             raise ValueError(f"candidates = {candidates}: the menu needs at least {MENU_MEMBERS + 1}")
-        self.space = spaces.Discrete(1 + 2 * (MENU_MEMBERS + 1))
+        self.space = spaces.Discrete(MENU_ENTRIES)
         self._order, self._candidates, self._ring_m = order, candidates, scenario.ring_m
         self._constants = constants(scenario)
 
@@ -43,7 +44,10 @@ class MenuAction:
         nodes = view.nearest(self._candidates, self._ring_m)[0]
         if self._order == "nearest":
             return nodes
-        ordered, kept = np.empty_like(nodes), np.where(_moves.py_func(actions, view.head), -1, view.head)
+        moves = _moves.py_func(actions, view.head)
+        if view.orders(self._order) is not None:
+            return np.where(moves[:, None], view.orders(self._order)[:, 1], view.orders(self._order)[:, 0])
+        ordered, kept = np.empty_like(nodes), np.where(moves, -1, view.head)
         lam = view.lam.copy() if self._order == "value" else np.zeros(len(nodes))
         order_by_merit(0, len(nodes), self._constants, view.positions, kept, view.belief, lam, nodes, ordered)
         return ordered
@@ -117,6 +121,50 @@ class SubsetAction:
         return np.concatenate([keep[:, None], exists, choice], axis=1)
 
 
+class RadiusAction:
+    """Box(1) in [0, 1]: all living nodes within so much of two sensing radii of the prediction, among the nearest. The
+    head stays while the prediction is within 0.8 sensing radii of it; then the nearest node leads."""
+
+    NEAR = 0.8
+
+    def __init__(self, scenario: Scenario, order: str, candidates: int):
+        self.space = spaces.Box(0.0, 1.0, (1,), np.float32)
+        self._candidates, self._radius_m = candidates, scenario.radius_m
+
+    def cluster(self, action, view: View) -> Cluster:
+        """The nodes within the radius."""
+        action = _in_box(action, self.space, len(view.row))
+        nodes, distances = view.nearest(self._candidates)
+        members = np.where(distances <= 2.0 * self._radius_m * action, nodes, -1)
+        standing = view.head >= 0
+        offset = view.positions[view.rows, np.maximum(view.head, 0)] - view.prediction
+        near = (offset * offset).sum(axis=1) <= (self.NEAR * self._radius_m) ** 2
+        return Cluster(np.where(standing & near, view.head, nodes[:, 0]), members.astype(np.int32))
+
+    def masks(self, view: View) -> np.ndarray:
+        """Refused: numbers have no mask."""
+        raise AttributeError("action 'radius' is a number: it has no masks")
+
+
+class ScoresAction:
+    """Box(K) in [-1, 1]: of the K nearest candidates those above 0 are members and the highest is the head."""
+
+    def __init__(self, scenario: Scenario, order: str, candidates: int):
+        self.space = spaces.Box(-1.0, 1.0, (candidates,), np.float32)
+        self._candidates, self._ring_m = candidates, scenario.ring_m
+
+    def cluster(self, action, view: View) -> Cluster:
+        """The cluster that the scores name."""
+        action = _in_box(action, self.space, len(view.row))
+        nodes = view.nearest(self._candidates, self._ring_m)[0]
+        head = np.where(nodes >= 0, action, -np.inf).argmax(axis=1)
+        return Cluster(nodes[view.rows, head], np.where(action > 0, nodes, -1).astype(np.int32))
+
+    def masks(self, view: View) -> np.ndarray:
+        """Refused: numbers have no mask."""
+        raise AttributeError("action 'scores' are numbers: they have no masks")
+
+
 class NodesAction:
     """MultiDiscrete([2] * S): who is awake. The head is the chosen node nearest to the prediction; if none is chosen,
     the living node nearest to it, alone."""
@@ -174,11 +222,28 @@ def _in_range(action, space, rows: int) -> np.ndarray:
     return array
 
 
+def _in_box(action, space, rows: int) -> np.ndarray:
+    """The actions as an array (rows, ...), if they are in the space."""
+    array = np.asarray(action)
+    if array.dtype.kind not in "fiu" or array.shape != (rows, *space.shape):
+        raise _refusal(action, space)
+    if not ((array >= space.low) & (array <= space.high)).all():  # NaN is not
+        raise _refusal(action, space)
+    return array
+
+
 def _refusal(action, space) -> ValueError:
     return ValueError(f"action {action!r} is not in {space}, one for each row")
 
 
-ACTIONS = {"menu": MenuAction, "subset": SubsetAction, "nodes": NodesAction, "cluster": ClusterAction}
+ACTIONS = {
+    "menu": MenuAction,
+    "subset": SubsetAction,
+    "radius": RadiusAction,
+    "scores": ScoresAction,
+    "nodes": NodesAction,
+    "cluster": ClusterAction,
+}
 
 
 def make_action(name: str, scenario: Scenario, order: str, candidates: int):

@@ -14,6 +14,7 @@ TOLD = (
     "searched",
     "n_eff",
     "posterior_rms_m",
+    "believed_error_m",
     "alive",
     "target_m",
     "estimate_m",

@@ -93,43 +93,59 @@ def _price_mj(detection, positions, node, head, mean, c):
     return 1e3 * (detection * report + c.awake_j - c.asleep_j)
 
 
-@kernel
-def order_by_merit(start, stop, cs, positions, heads, beliefs, lams, nodes, ordered):
-    """Greedy order of the candidates: each next one is the best after those before it, by the drop of the root of the
-    position covariance's trace that it brings [m], less lam times its price.
+@lean_piece
+def order_row(positions, head, mean, cov, lam, nodes, c, detections, ordered, drops):
+    """Greedy order of one row's candidates: each next one is the best after those before it, by the drop of the root of
+    the position covariance's trace that it brings [m], less lam times its price.
 
     Args:
-        lams: (B,) m/mJ; 0: by information alone.
-        heads: (B,) a head that senses anyhow and is conditioned on first; -1: none.
-        nodes: (B, K) candidates, -1: none.
-        ordered: (B, K) filled; -1 at the end where candidates are missing or are the head.
+        head: senses anyhow and is conditioned on first; -1: none.
+        mean, cov: predicted.
+        lam: m/mJ; 0: by information alone.
+        nodes: (K,) candidates, -1: none.
+        detections: (K,) room for their probabilities.
+        ordered: (K,) filled; -1 at the end where candidates are missing or are the head.
+        drops: (K,) filled with the drop that each brings [m].
     """
-    c = cs[0]
-    size = nodes.shape[1]
-    used, detections = np.empty(size, np.bool_), np.zeros(size)
+    p00, p01, p11 = cov[0, 0], cov[0, 2], cov[2, 2]
+    if head >= 0:
+        detection = mean_detection(positions, head, mean, cov, c)
+        _, p00, p01, p11 = gain(detection, positions, head, mean, cov, p00, p01, p11, c)
+    ordered[:] = -1
+    drops[:] = 0.0
+    for k in range(len(nodes)):
+        detections[k] = -1.0  # taken
+        if nodes[k] >= 0 and nodes[k] != head:
+            detections[k] = mean_detection(positions, nodes[k], mean, cov, c)
+    for slot in range(len(nodes)):
+        best, most, most_drop, after = -1, -np.inf, 0.0, (p00, p01, p11)
+        for k in range(len(nodes)):
+            if detections[k] >= 0.0:
+                g, q00, q01, q11 = gain(detections[k], positions, nodes[k], mean, cov, p00, p01, p11, c)
+                drop = np.sqrt(p00 + p11) - np.sqrt(max(p00 + p11 - g, 0.0))
+                value = drop
+                if lam > 0.0:
+                    value -= lam * _price_mj(detections[k], positions, nodes[k], head, mean, c)
+                if value > most:
+                    best, most, most_drop, after = k, value, drop, (q00, q01, q11)
+        if best < 0:
+            break
+        detections[best] = -1.0
+        ordered[slot] = nodes[best]
+        drops[slot] = most_drop
+        p00, p01, p11 = after
+
+
+@kernel
+def order_by_merit(start, stop, cs, positions, heads, beliefs, lams, nodes, ordered):
+    """`order_row` for every row.
+
+    Args:
+        heads, lams: (B,).
+        nodes: (B, K) candidates, -1: none.
+        ordered: (B, K) filled.
+    """
+    detections, drops = np.empty(nodes.shape[1]), np.empty(nodes.shape[1])
     for b in range(start, stop):
         mean, cov = beliefs[b].predicted_mean, beliefs[b].predicted_cov
-        p00, p01, p11 = cov[0, 0], cov[0, 2], cov[2, 2]
-        if heads[b] >= 0:
-            detection = mean_detection(positions[b], heads[b], mean, cov, c)
-            _, p00, p01, p11 = gain(detection, positions[b], heads[b], mean, cov, p00, p01, p11, c)
-        ordered[b] = -1
-        for k in range(size):
-            used[k] = nodes[b, k] < 0 or nodes[b, k] == heads[b]
-            if not used[k]:
-                detections[k] = mean_detection(positions[b], nodes[b, k], mean, cov, c)
-        for slot in range(size):
-            best, most, after = -1, -np.inf, (p00, p01, p11)
-            for k in range(size):
-                if not used[k]:
-                    g, q00, q01, q11 = gain(detections[k], positions[b], nodes[b, k], mean, cov, p00, p01, p11, c)
-                    value = np.sqrt(p00 + p11) - np.sqrt(max(p00 + p11 - g, 0.0))
-                    if lams[b] > 0.0:
-                        value -= lams[b] * _price_mj(detections[k], positions[b], nodes[b, k], heads[b], mean, c)
-                    if value > most:
-                        best, most, after = k, value, (q00, q01, q11)
-            if best < 0:
-                break
-            used[best] = True
-            ordered[b, slot] = nodes[b, best]
-            p00, p01, p11 = after
+        order_row(positions[b], heads[b], mean, cov, lams[b], nodes[b], cs[0], detections, ordered[b], drops)

@@ -5,157 +5,133 @@ from __future__ import annotations
 import numpy as np
 from gymnasium import spaces
 
-from wsn_env.compiling import lean_kernel, lean_piece, over_rows, threads_for
-from wsn_env.interface.merit import gain, mean_detection
-from wsn_env.numerics import log
+from wsn_env.compiling import lean_kernel, over_rows, threads_for
+from wsn_env.interface.actions import MENU_ENTRIES
+from wsn_env.interface.features import (
+    BELIEF_FEATURES,
+    BOUND,
+    CANDIDATE_FEATURES,
+    clip,
+    describe_belief,
+    describe_candidate,
+    describe_merit,
+)
+from wsn_env.interface.merit import ORDERS, order_row
+from wsn_env.interface.prospects import ENTRY_FEATURES, describe_entries, describe_standing
 from wsn_env.physics.constants import constants
-from wsn_env.physics.field import find_candidates, squared_distance
-from wsn_env.physics.sensing import detection_piece
+from wsn_env.physics.field import find_candidates
 from wsn_env.quantity import suggest
 from wsn_env.scenario import Scenario
 from wsn_env.types import network_of
 from wsn_env.view import View
 
-BELIEF_FEATURES = (
-    "lam",  # log, halved
-    "major_sd",  # log of the position ellipse's axes
-    "minor_sd",
-    "major_radii",  # the same in sensing radii
-    "minor_radii",
-    "axis_cos",  # twice the angle between the major axis and the velocity
-    "axis_sin",
-    "speed",  # m/s
-    "velocity_sd",  # log
-    "silence",  # log probability of the silence since the last report
-    "heard",  # reports in the last period
-    "head_ahead",  # where the head stands, in radii along and across the velocity
-    "head_left",
-    "head_distance",
-    "head_detection",
-    "head_nearest",  # 1: no living node is nearer
-    "members",
-    "joint_detection",  # of the standing cluster at the prediction
-    "sparseness",  # distance of the farthest candidate
-)
-CANDIDATE_FEATURES = (
-    "ahead",  # in radii along and across the velocity, from the prediction
-    "left",
-    "distance",
-    "detection",
-    "head_distance",
-    "member",
-    "head",
-    "battery",  # share left
-    "gain",  # log of the trace's expected drop by this node alone
-)
-BOUND = 10.0
+G = len(BELIEF_FEATURES)
+NEAREST, INFORMATION, VALUE = range(len(ORDERS))
 
 
 @lean_kernel
-def _encode(start, stop, cs, battery_j, which, nodes, distances, out, rows, beliefs, count, *network_arrays):
+def _encode_candidates(
+    start,
+    stop,
+    cs,
+    battery_j,
+    which,
+    nodes,
+    distances,
+    detections,
+    drops,
+    ordered,
+    out,
+    rows,
+    beliefs,
+    reported,
+    *network,
+):
     """Fill out (B, n): BELIEF_FEATURES, then CANDIDATE_FEATURES of each candidate; and the candidates (B, K). Only in
     the rows marked in `which`."""
-    c, network = cs[0], network_of(network_arrays)
-    size, width = len(BELIEF_FEATURES), len(CANDIDATE_FEATURES)
+    c, network, width = cs[0], network_of(network), len(CANDIDATE_FEATURES)
     for b in range(start, stop):
         if not which[b]:
             continue
-        m, p, head = beliefs[b].predicted_mean, beliefs[b].predicted_cov, network.row[b].head
+        m, p, standing = beliefs[b].predicted_mean, beliefs[b].predicted_cov, network.row[b]
         find_candidates(network, b, m[0], m[2], c.ring_m, nodes[b], distances[b])
-        positions, members, n = network.positions[b], network.members[b], network.row[b].n_members
         f = out[b]
-        f[:] = 0.0
-        f[0] = 0.5 * log(max(rows[b].lam, 1e-3))
-        ex, ey = _encode_ellipse(m, p, c, f)
-        f[9] = 0.2 * rows[b].log_miss
-        f[10] = 0.25 * count[b]
-        if head >= 0:
-            _encode_head(head, head == nodes[b, 0], members, n, positions, m, p, ex, ey, c, f)
-        f[18] = distances[b, -1] / c.radius_m
+        ex, ey = describe_belief(b, rows, beliefs, reported, network, nodes[b], distances[b], c, f[:G])
+        f[G:] = 0.0
+        positions, members = network.positions[b], network.members[b]
         for k in range(nodes.shape[1]):
-            node, g = nodes[b, k], f[size + k * width : size + (k + 1) * width]
+            node, g = nodes[b, k], f[G + k * width : G + (k + 1) * width]
             if node < 0:
                 g[2] = BOUND
                 continue
             g[2] = distances[b, k] / c.radius_m
             g[7] = network.battery[b, node] / battery_j
-            _encode_candidate(node, head, members, n, positions, m, p, ex, ey, c, g)
-        for i in range(len(f)):
-            f[i] = min(max(f[i], np.float32(-BOUND)), np.float32(BOUND))
+            describe_candidate(node, standing.head, members, standing.n_members, positions, m, p, ex, ey, c, g)
+        order_row(positions, standing.head, m, p, 0.0, nodes[b], c, detections[b], ordered[b], drops[b])
+        describe_merit(nodes[b], ordered[b], drops[b], np.sqrt(p[0, 0] + p[2, 2] + 1e-12), width, f[G:])
+        clip(f)
 
 
-@lean_piece
-def _encode_ellipse(m, p, c, f):
-    """f[1:9]: the position's ellipse and the velocity. Returns the direction of the velocity."""
-    half, off = 0.5 * (p[0, 0] + p[2, 2]), 0.5 * (p[0, 0] - p[2, 2])
-    root = np.sqrt(off * off + p[0, 2] * p[0, 2])
-    major, minor = max(half + root, 1e-6), max(half - root, 1e-6)
-    speed = np.sqrt(m[1] * m[1] + m[3] * m[3])
-    ex, ey = (m[1] / speed, m[3] / speed) if speed > 1e-9 else (1.0, 0.0)
-    cos2, sin2 = (off / root, p[0, 2] / root) if root > 1e-12 else (1.0, 0.0)
-    c2, s2 = ex * ex - ey * ey, 2.0 * ex * ey
-    f[1] = 0.5 * log(major)
-    f[2] = 0.5 * log(minor)
-    f[3] = np.sqrt(major) / c.radius_m
-    f[4] = np.sqrt(minor) / c.radius_m
-    f[5] = cos2 * c2 + sin2 * s2
-    f[6] = sin2 * c2 - cos2 * s2
-    f[7] = speed
-    f[8] = 0.5 * log(max(p[1, 1] + p[3, 3], 1e-6))
-    return ex, ey
-
-
-@lean_piece
-def _encode_head(head, is_nearest, members, n, positions, m, p, ex, ey, c, f):
-    """f[11:18]: the head, and what the standing cluster would detect at the prediction."""
-    dx, dy = (positions[head, 0] - m[0]) / c.radius_m, (positions[head, 1] - m[2]) / c.radius_m
-    f[11] = dx * ex + dy * ey
-    f[12] = dy * ex - dx * ey
-    f[13] = np.sqrt(dx * dx + dy * dy)
-    f[14] = mean_detection(positions, head, m, p, c)
-    f[15] = 1.0 if is_nearest else 0.0
-    f[16] = 0.25 * n
-    missed = 1.0 - detection_piece(np.sqrt(squared_distance(positions, head, m[0], m[2])), c)
-    for k in range(n):
-        missed *= 1.0 - detection_piece(np.sqrt(squared_distance(positions, members[k], m[0], m[2])), c)
-    f[17] = 1.0 - missed
-
-
-@lean_piece
-def _encode_candidate(node, head, members, n, positions, m, p, ex, ey, c, g):
-    """g[0:2], g[3:7], g[8]: a candidate's place, chances, role and gain."""
-    dx, dy = (positions[node, 0] - m[0]) / c.radius_m, (positions[node, 1] - m[2]) / c.radius_m
-    g[0] = dx * ex + dy * ey
-    g[1] = dy * ex - dx * ey
-    detection = mean_detection(positions, node, m, p, c)
-    g[3] = detection
-    if head >= 0:
-        g[4] = np.sqrt(squared_distance(positions, node, positions[head, 0], positions[head, 1])) / c.radius_m
-    for k in range(n):
-        if members[k] == node:
-            g[5] = 1.0
-    if node == head:
-        g[5] = 1.0
-        g[6] = 1.0
-    drop = gain(detection, positions, node, m, p, p[0, 0], p[0, 2], p[2, 2], c)[0]
-    g[8] = 0.25 * log(max(drop / (p[0, 0] + p[2, 2] + 1e-12), 1e-6))
+@lean_kernel
+def _encode_menu(
+    start,
+    stop,
+    cs,
+    scale,
+    by,
+    which,
+    nodes,
+    distances,
+    detections,
+    drops,
+    orders,
+    out,
+    rows,
+    beliefs,
+    reported,
+    *network,
+):
+    """Fill out (B, n): BELIEF_FEATURES, then ENTRY_FEATURES of each of the menu's entries; the candidates (B, K); and
+    their orders of merit if the head stays and if it moves (B, 2, K). Only in the rows marked in `which`."""
+    c, network, width = cs[0], network_of(network), len(ENTRY_FEATURES)
+    for b in range(start, stop):
+        if not which[b]:
+            continue
+        m, p, standing = beliefs[b].predicted_mean, beliefs[b].predicted_cov, network.row[b]
+        positions, members, head, lam = network.positions[b], network.members[b], standing.head, rows[b].lam
+        find_candidates(network, b, m[0], m[2], c.ring_m, nodes[b], distances[b])
+        f = out[b]
+        ex, ey = describe_belief(b, rows, beliefs, reported, network, nodes[b], distances[b], c, f[:G])
+        describe_standing(positions, standing, members, m, p, ex, ey, lam, scale, c, f[G : G + width])
+        half = (len(f) - G - width) // 2
+        for moves in range(2):
+            kept, ordered = -1 if moves else head, orders[b, moves]
+            if by == NEAREST:
+                for k in range(len(ordered)):
+                    ordered[k] = nodes[b, k]
+            else:
+                price = lam if by == VALUE else 0.0
+                order_row(positions, kept, m, p, price, nodes[b], c, detections[b], ordered, drops[b])
+            leads = kept if kept >= 0 else ordered[0]
+            entries = f[G + width + moves * half : G + width + (1 + moves) * half]
+            describe_entries(positions, standing, members, ordered, leads, m, p, ex, ey, lam, scale, c, width, entries)
+        clip(f)
 
 
 class CandidatesObservation:
     """Flat Box float32: BELIEF_FEATURES, then CANDIDATE_FEATURES of the K living nodes nearest to the prediction."""
 
-    def __init__(self, scenario: Scenario, candidates: int, threads: int = 1):
-        self.size = len(BELIEF_FEATURES)
-        self.shape = (candidates, len(CANDIDATE_FEATURES))
-        self.space = spaces.Box(-BOUND, BOUND, (self.size + candidates * self.shape[1],), np.float32)
-        self._threads = threads
-        self._constants = constants(scenario)
-        self._battery_j = scenario.radio.battery_j
-        self._ring_m = scenario.ring_m
+    features = CANDIDATE_FEATURES
+
+    def __init__(self, scenario: Scenario, order: str, candidates: int, threads: int = 1):
+        self.shape = (candidates, len(self.features))
+        self.space = spaces.Box(-BOUND, BOUND, (G + candidates * self.shape[1],), np.float32)
+        self._candidates, self._ring_m, self._threads = candidates, scenario.ring_m, threads
+        self._numbers = constants(scenario), scenario.radio.battery_j
 
     def encode(self, view: View) -> np.ndarray:
         """(B, n) float32, fresh."""
-        rows, candidates = len(view.row), self.shape[0]
+        rows, candidates = len(view.row), self._candidates
         view.remember_nearest(np.empty((rows, candidates), np.int64), np.empty((rows, candidates)), self._ring_m)
         return self._fill(np.empty((rows, *self.space.shape), np.float32), view, np.ones(rows, bool))
 
@@ -165,26 +141,55 @@ class CandidatesObservation:
         Args:
             rows: (B,) bool, which have changed since `last` was encoded from the view `before`.
         """
-        view.remember_nearest(*(array.copy() for array in before.nearest(self.shape[0], self._ring_m)), self._ring_m)
+        view.remember_nearest(*(array.copy() for array in before.nearest(self._candidates, self._ring_m)), self._ring_m)
         return self._fill(last.copy(), view, rows)
 
     def _fill(self, out, view: View, rows):
-        filled, seen = (*view.nearest(self.shape[0], self._ring_m), out), (view.row, view.belief, view.reports.count)
-        numbers = self._constants, self._battery_j
-        threads = threads_for(rows, self._threads)
-        over_rows(_encode, len(rows), threads, *numbers, rows, *filled, *seen, *view.network.arrays())
+        ordered = np.empty((len(rows), self._candidates), np.int64)
+        return self._run(_encode_candidates, ordered, out, view, rows)
+
+    def _run(self, kernel, ordered, out, view: View, rows):
+        nodes, distances = view.nearest(self._candidates, self._ring_m)
+        room = np.empty(nodes.shape), np.empty(nodes.shape)
+        threads, seen = threads_for(rows, self._threads), (view.row, view.belief, view.reports.count)
+        arguments = *self._numbers, rows, nodes, distances, *room, ordered, out, *seen, *view.network.arrays()
+        over_rows(kernel, len(rows), threads, *arguments)
         return out
 
 
-class DictObservation:
-    """The same features under names: belief (19,), candidates (K, 9), and lam (1,) [m/mJ]."""
+class MenuObservation(CandidatesObservation):
+    """Flat Box float32: BELIEF_FEATURES, then ENTRY_FEATURES of each entry of the menu: what it promises."""
 
-    def __init__(self, scenario: Scenario, candidates: int, threads: int = 1):
-        self._flat = CandidatesObservation(scenario, candidates, threads)
+    features = ENTRY_FEATURES
+
+    def __init__(self, scenario: Scenario, order: str, candidates: int, threads: int = 1):
+        super().__init__(scenario, order, candidates, threads)
+        self.shape = (MENU_ENTRIES, len(self.features))
+        self.space = spaces.Box(-BOUND, BOUND, (G + MENU_ENTRIES * self.shape[1],), np.float32)
+        scale = np.array([scenario.typical_error_m, scenario.typical_energy_mj])
+        self._order = order
+        self._numbers = constants(scenario), scale, ORDERS.index(order)
+
+    def renew(self, view: View, rows, before: View, last) -> np.ndarray:
+        """As CandidatesObservation's."""
+        view.remember_orders(self._order, before.orders(self._order).copy())
+        return super().renew(view, rows, before, last)
+
+    def _fill(self, out, view: View, rows):
+        if view.orders(self._order) is None:
+            view.remember_orders(self._order, np.empty((len(rows), 2, self._candidates), np.int64))
+        return self._run(_encode_menu, view.orders(self._order), out, view, rows)
+
+
+class DictObservation:
+    """The same features under names: belief (19,), candidates (K, 11), and lam (1,) [m/mJ]."""
+
+    def __init__(self, scenario: Scenario, order: str, candidates: int, threads: int = 1):
+        self._flat = CandidatesObservation(scenario, order, candidates, threads)
         high = max(scenario.lam_range[1], 1.0)
         self.space = spaces.Dict(
             {
-                "belief": spaces.Box(-BOUND, BOUND, (self._flat.size,), np.float32),
+                "belief": spaces.Box(-BOUND, BOUND, (G,), np.float32),
                 "candidates": spaces.Box(-BOUND, BOUND, self._flat.shape, np.float32),
                 "lam": spaces.Box(0.0, high, (1,), np.float32),
             }
@@ -194,8 +199,8 @@ class DictObservation:
         """A dict of (B, ...) float32, fresh."""
         flat = self._flat.encode(view)
         return {
-            "belief": flat[:, : self._flat.size].copy(),
-            "candidates": flat[:, self._flat.size :].reshape(len(flat), *self._flat.shape).copy(),
+            "belief": flat[:, :G].copy(),
+            "candidates": flat[:, G:].reshape(len(flat), *self._flat.shape).copy(),
             "lam": np.minimum(view.lam[:, None].astype(np.float32), self.space["lam"].high[0]),
         }
 
@@ -207,7 +212,7 @@ class DictObservation:
 class ViewObservation:
     """Everything a network could know, as float64: enough for every hand-written policy (`View.from_arrays`)."""
 
-    def __init__(self, scenario: Scenario, candidates: int, threads: int = 1):
+    def __init__(self, scenario: Scenario, order: str, candidates: int, threads: int = 1):
         nodes, side, far = scenario.field.nodes, scenario.field.side_m, 1e9
 
         def box(low, high, *shape):
@@ -242,10 +247,15 @@ class ViewObservation:
         return self.encode(view)
 
 
-OBSERVATIONS = {"candidates": CandidatesObservation, "dict": DictObservation, "view": ViewObservation}
+OBSERVATIONS = {
+    "candidates": CandidatesObservation,
+    "menu": MenuObservation,
+    "dict": DictObservation,
+    "view": ViewObservation,
+}
 
 
-def make_observation(name: str, scenario: Scenario, candidates: int, threads: int = 1):
+def make_observation(name: str, scenario: Scenario, order: str, candidates: int, threads: int = 1):
     """An observation by name.
 
     Raises:
@@ -253,4 +263,4 @@ def make_observation(name: str, scenario: Scenario, candidates: int, threads: in
     """
     if name not in OBSERVATIONS:
         raise ValueError(f"observation {name!r} is unknown: {suggest(name, OBSERVATIONS)}")
-    return OBSERVATIONS[name](scenario, candidates, threads)
+    return OBSERVATIONS[name](scenario, order, candidates, threads)

@@ -20,7 +20,7 @@ def belief_cost(outcome):
     For training only.
     """
     wrong = outcome["error_m"] > DISBELIEF * outcome["posterior_rms_m"]
-    return np.where(wrong, outcome["error_m"], outcome["posterior_rms_m"])
+    return np.where(wrong, outcome["error_m"], outcome["believed_error_m"])
 
 
 REWARDS = {"error": error_cost, "belief": belief_cost}

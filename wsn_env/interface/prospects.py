@@ -1,0 +1,175 @@
+"""What each entry of the menu promises: the belief, the energy and the cluster that a choice would leave."""
+
+import numpy as np
+
+from wsn_env.compiling import lean_piece
+from wsn_env.interface.merit import gain, mean_detection
+from wsn_env.numerics import expected_error, log
+from wsn_env.physics.field import squared_distance
+from wsn_env.physics.radio import TO_HEAD, outside, transmission
+from wsn_env.physics.sensing import detection_piece
+
+ENTRY_FEATURES = (
+    "standing",  # 1: the cluster as it is
+    "moves",  # 1: the head's role goes to the best node
+    "members",  # further ones
+    "invited",  # of them, who sleep
+    "sd",  # log of the expected root of the position covariance's trace
+    "sd_drop",  # log of its ratio to the prediction's
+    "error_cost",  # expected error, in a learner's unit of cost
+    "energy_cost",  # lam times expected energy, in the same
+    "energy",  # its root, in roots of what the scenario calls typical
+    "detections",  # expected
+    "silence",  # probability that no report comes
+    "hold",  # probability of a detection three periods on, at the prediction
+    "head_ahead",  # where the head stands, in radii along and across the velocity
+    "head_left",
+    "head_distance",
+    "head_detection",
+)
+AHEAD = 3.0  # periods
+
+
+@lean_piece
+def describe_standing(positions, standing, members, m, p, ex, ey, lam, scale, c, f):
+    """Fill f with ENTRY_FEATURES of the standing cluster.
+
+    Args:
+        standing, members: the row's NETWORK and its members; without a head all features but `sd` are 0.
+        m, p: predicted mean and covariance; ex, ey: direction of its velocity.
+        scale: (typical error [m], typical energy [mJ]).
+    """
+    f[:] = 0.0
+    f[0] = 1.0
+    after, energy, sums = _begin(p), 0.0, (0.0, 1.0, 1.0)
+    if standing.head >= 0:
+        after, energy, sums = _add_head(positions, standing.head, standing.head, m, p, after, sums, c)
+        for k in range(standing.n_members):
+            after, price, sums = _add(positions, members[k], standing.head, False, m, p, after, sums, c)
+            energy += price
+        _write_head(positions, standing.head, m, p, ex, ey, c, f)
+    _write(standing.n_members, 0, p, after, energy, sums, lam, scale, f)
+
+
+@lean_piece
+def describe_entries(positions, standing, members, nodes, head, m, p, ex, ey, lam, scale, c, width, entries):
+    """Fill entries (N * width,) with ENTRY_FEATURES of the head and the first n further nodes, n = 0..N - 1.
+
+    Args:
+        nodes: (K,) candidates in order of merit, -1: none; the head may be among them.
+        head: who would lead, alive; -1: nobody could.
+    """
+    old, count = standing.head, standing.n_members
+    after, energy, sums = _begin(p), 0.0, (0.0, 1.0, 1.0)
+    if head >= 0:
+        after, energy, sums = _add_head(positions, head, old, m, p, after, sums, c)
+    slot, invited = 0, 0
+    for n in range(len(entries) // width):
+        f = entries[n * width : (n + 1) * width]
+        f[:] = 0.0
+        if n > 0 and head >= 0:
+            while slot < len(nodes) and (nodes[slot] == head or nodes[slot] < 0):
+                slot += 1
+            if slot < len(nodes):
+                node = nodes[slot]
+                slot += 1
+                awake = node == old or _among(node, members, count)
+                called = not awake or (c.receiver == TO_HEAD and head != old)  # a new head calls all of them
+                after, price, sums = _add(positions, node, head, called, m, p, after, sums, c)
+                energy += price
+                invited += called
+        f[1] = 1.0 if head != old else 0.0
+        if head >= 0:
+            _write_head(positions, head, m, p, ex, ey, c, f)
+        _write(n, invited, p, after, energy, sums, lam, scale, f)
+
+
+@lean_piece
+def _begin(p):
+    """Position covariance before any report."""
+    return p[0, 0], p[0, 2], p[2, 2]
+
+
+@lean_piece
+def _among(node, members, count):
+    for k in range(count):
+        if members[k] == node:
+            return True
+    return False
+
+
+@lean_piece
+def _chances(positions, node, m, sums, detection, arrival, c):
+    """Expected detections, probability of silence, and of none three periods on, with one node more."""
+    x, y = m[0] + AHEAD * c.period_s * m[1], m[2] + AHEAD * c.period_s * m[3]
+    later = detection_piece(np.sqrt(squared_distance(positions, node, x, y)), c)
+    return sums[0] + detection, sums[1] * (1.0 - detection * arrival), sums[2] * (1.0 - later)
+
+
+@lean_piece
+def _add_head(positions, head, old, m, p, after, sums, c):
+    """The head's own report, and the handover to it [mJ]."""
+    detection = mean_detection(positions, head, m, p, c)
+    _, p00, p01, p11 = gain(detection * c.head_delivery, positions, head, m, p, after[0], after[1], after[2], c)
+    joules = c.awake_j - c.asleep_j
+    if c.receiver != TO_HEAD:
+        joules += _report_j(positions, head, head, detection, m, c)
+    elif old >= 0 and head != old:
+        squared = squared_distance(positions, old, positions[head, 0], positions[head, 1])
+        hops = max(np.ceil(np.sqrt(squared) / c.hop_m), 1.0)
+        joules += hops * (transmission(c.handover_bits, squared, c) + c.handover_bits * c.rx_j_per_bit)
+    sums = _chances(positions, head, m, sums, detection, c.head_delivery, c)
+    return (p00, p01, p11), 1e3 * joules, sums
+
+
+@lean_piece
+def _add(positions, node, head, called, m, p, after, sums, c):
+    """A member's report, its invitation if it is called, its being awake [mJ]."""
+    detection = mean_detection(positions, node, m, p, c)
+    _, p00, p01, p11 = gain(detection * c.delivery, positions, node, m, p, after[0], after[1], after[2], c)
+    joules = c.awake_j - c.asleep_j + _report_j(positions, node, head, detection, m, c)
+    if called:
+        joules += c.invitation_bits * c.rx_j_per_bit
+        if c.receiver == TO_HEAD:
+            squared = squared_distance(positions, node, positions[head, 0], positions[head, 1])
+            joules += transmission(c.invitation_bits, squared, c)
+    sums = _chances(positions, node, m, sums, detection, c.delivery, c)
+    return (p00, p01, p11), 1e3 * joules, sums
+
+
+@lean_piece
+def _report_j(positions, node, head, detection, m, c):
+    """Expected energy of a report with its retries [J]."""
+    if c.receiver == TO_HEAD:
+        x, y, hearing = positions[head, 0], positions[head, 1], c.report_bits * c.rx_j_per_bit
+    else:
+        x, y = outside(m, c)
+        hearing = 0.0
+    tries = c.delivery / c.packet_success if c.packet_success > 0.0 else float(c.tries)
+    return detection * tries * (transmission(c.report_bits, squared_distance(positions, node, x, y), c) + hearing)
+
+
+@lean_piece
+def _write_head(positions, head, m, p, ex, ey, c, f):
+    dx, dy = (positions[head, 0] - m[0]) / c.radius_m, (positions[head, 1] - m[2]) / c.radius_m
+    f[12] = dx * ex + dy * ey
+    f[13] = dy * ex - dx * ey
+    f[14] = np.sqrt(dx * dx + dy * dy)
+    f[15] = mean_detection(positions, head, m, p, c)
+
+
+@lean_piece
+def _write(n, invited, p, after, energy, sums, lam, scale, f):
+    unit = scale[0] + lam * scale[1]
+    before = max(p[0, 0] + p[2, 2], 1e-12)
+    left = max(after[0] + after[2], 1e-12)
+    f[2] = 0.25 * n
+    f[3] = 0.25 * invited
+    f[4] = 0.5 * log(left)
+    f[5] = 0.5 * log(left / before)
+    f[6] = expected_error(after[0], after[1], after[2]) / unit
+    f[7] = lam * energy / unit
+    f[8] = np.sqrt(energy / max(scale[1], 1e-9))
+    f[9] = 0.25 * sums[0]
+    f[10] = sums[1]
+    f[11] = 1.0 - sums[2]
