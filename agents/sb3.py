@@ -29,6 +29,8 @@ class SB3VecEnv(VecEnv):
     def __init__(self, envs: ClusterVectorEnv, scaled: bool = False, stagger: bool = False):
         if envs.autoreset_mode == AutoresetMode.NEXT_STEP:
             raise ValueError("autoreset_mode NextStep makes rows that are no transitions: use SameStep or Disabled")
+        if envs.interface.reward_space is not None:
+            raise ValueError("reward 'vector': stable-baselines3 learns from one number, use 'error' or 'belief'")
         if stagger and envs.autoreset_mode != AutoresetMode.DISABLED:
             raise ValueError("stagger=True needs autoreset_mode Disabled")
         self.envs = envs

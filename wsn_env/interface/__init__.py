@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from wsn_env.interface.actions import make_action
 from wsn_env.interface.observations import make_observation
-from wsn_env.interface.rewards import make_reward
+from wsn_env.interface.rewards import make_reward, reward_space
 from wsn_env.scenario import Scenario
 
 
@@ -26,3 +26,4 @@ class Interface:
         self.action = make_action(settings.action, scenario, settings.order, settings.candidates)
         self.observation = make_observation(settings.observation, scenario, settings.candidates, threads)
         self.reward = make_reward(settings.reward)
+        self.reward_space = reward_space(settings.reward)
