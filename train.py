@@ -315,7 +315,7 @@ class Watch(BaseCallback):
 def compare(settings: Training, scenario, policy: Path) -> None:
     """Paired comparison with every baseline: table, CSV, JSON, picture."""
     folder = settings.folder
-    lams = settings.lam if len(settings.lam) == 1 else scenario.lam_sweep
+    lams = settings.lam if len(settings.lam) == 1 else scenario.lam_octaves
     policies = {"ppo": PPOPolicy(scenario, path=str(policy))}
     policies |= {name: make_policy(name, scenario) for name in policy_names() if name != "ppo"}
     with progress_bar() as report:

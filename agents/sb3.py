@@ -33,6 +33,8 @@ class SB3VecEnv(VecEnv):
     def __init__(self, envs: ClusterVectorEnv, scaled: bool = False, stagger: bool = False, calibrated: bool = False):
         if envs.autoreset_mode == AutoresetMode.NEXT_STEP:
             raise ValueError("autoreset_mode NextStep makes rows that are no transitions: use SameStep or Disabled")
+        if envs.interface.reward_space is not None:
+            raise ValueError("reward 'vector': stable-baselines3 learns from one number, use 'error' or 'belief'")
         if calibrated and envs.autoreset_mode != AutoresetMode.DISABLED:
             raise ValueError("calibrated=True needs autoreset_mode Disabled")
         if stagger and envs.autoreset_mode != AutoresetMode.DISABLED:

@@ -34,6 +34,8 @@ FLOORS = {
     "agents.sb3": 7,  # adapts the vector environment
     "wsn_env.evaluation": 7,
     "wsn_env.reports": 7,
+    "wsn_env.front": 7,
+    "wsn_env.front_report": 7,
     "wsn_env.papers": 8,
     "benchmarks": 8,
     "benchmarks.training": 10,  # it times train.py

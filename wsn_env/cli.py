@@ -16,7 +16,8 @@ from wsn_env.scenario import Scenario
 
 @dataclass
 class Evaluate:
-    """Compare policies on common random episodes: a table, and evaluation.csv, .json and .md."""
+    """Compare policies on common random episodes: a table, and evaluation.csv, .json and .md; with --pareto their
+    fronts."""
 
     scenario: str = "PreDC-v0"
     """Scenario id."""
@@ -24,7 +25,10 @@ class Evaluate:
     """Policies by name, or paths of a saved policy.json, also as label=path; the first is the reference of the
     differences."""
     lam: list[float] | None = None
-    """Trade-offs between error and energy [m/mJ]; left out: the scenario's."""
+    """Trade-offs between error and energy [m/mJ]; left out: the scenario's, or with --pareto nine about it."""
+    pareto: bool = False
+    """The fronts of error against energy over the lams, their hypervolumes with paired differences, and front.csv,
+    .json and .png. Name the policy of interest first: it is compared with each other and with all others together."""
     episodes: int = 100
     """Episodes for each policy and lam."""
     seed: int = 0
@@ -74,25 +78,35 @@ def main(arguments: list[str] | None = None) -> int:
 def run_evaluate(command: Evaluate) -> None:
     """`wsn evaluate`."""
     from wsn_env.evaluation import evaluate, forget_blocks
+    from wsn_env.front import check_front_libraries, lam_sweep
+    from wsn_env.front_report import FRONT_FILES, report_front
     from wsn_env.reports import print_tables, save_markdown
 
     scenario = make_scenario(command.scenario, command.set, command.tracks)
+    lams = command.lam
+    if command.pareto:
+        check_front_libraries(pictures=command.out is not None)
+        lams = lams or lam_sweep(scenario)
     with progress_bar() as report:
         evaluation = evaluate(
             command.policies,
             scenario,
-            command.lam,
+            lams,
             command.episodes,
             command.seed,
             keep=command.out,
             progress=report,
         )
-    print_tables(evaluation)
+    if command.pareto:
+        report_front(evaluation, command.out)
+    else:
+        print_tables(evaluation)
     if command.out:
         evaluation.save(command.out)
         save_markdown(evaluation, command.out)
         forget_blocks(command.out)
-        print(f"written: {command.out / 'evaluation.csv'}, {command.out / 'evaluation.json'}")
+        names = ("evaluation.csv", "evaluation.json", *(FRONT_FILES if command.pareto else ()))
+        print(f"written: {', '.join(str(command.out / name) for name in names)}")
 
 
 def run_reproduce(command: Reproduce) -> None:

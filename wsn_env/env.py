@@ -25,7 +25,8 @@ class ClusterEnv(gym.Env):
         scenario: an id such as "PreDC-v0", or a Scenario.
         action: "menu" | "subset" | "nodes" | "cluster".
         observation: "candidates" | "dict" | "view".
-        reward: "error" (the mission's) | "belief" (lower variance, for training only).
+        reward: "error" (the mission's) | "belief" (lower variance, for training only) | "vector" ([-error, -energy] as
+            MO-Gymnasium has it, with `reward_space` and `reward_dim`).
         order: "nearest" | "information" | "value", the menu's order of merit.
         candidates: K, how many nodes actions and observations consider.
         render_mode: None | "rgb_array".
@@ -56,6 +57,8 @@ class ClusterEnv(gym.Env):
         self.render_mode = render_mode
         self.action_space = self.interface.action.space
         self.observation_space = self.interface.observation.space
+        if self.interface.reward_space is not None:
+            self.reward_space, self.reward_dim = self.interface.reward_space, 2
         self._state: State | None = None
         self._view: View | None = None
         self._lam = 0.0
@@ -90,9 +93,11 @@ class ClusterEnv(gym.Env):
             info["antnp"] = self._detections / self.scenario.periods
         return self._observe(), reward, False, truncated, info
 
-    def _reward_and_info(self, outcome: Outcome) -> tuple[float, dict[str, Any]]:
+    def _reward_and_info(self, outcome: Outcome) -> tuple[float | np.ndarray, dict[str, Any]]:
         numbers = dict(zip(OUTCOME.names, outcome.row.item()))
-        reward = float(self.interface.reward(numbers, self._lam))
+        reward = self.interface.reward(numbers, self._lam)
+        if self.interface.reward_space is None:
+            reward = float(reward)
         return reward, measures(numbers, self._lam, reward)
 
     def action_masks(self) -> np.ndarray:

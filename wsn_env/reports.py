@@ -16,16 +16,16 @@ def table_rows(evaluation: Evaluation, lam: float, reference: str) -> list[tuple
     rows = []
     for policy in evaluation.policies:
         s = evaluation.summary(policy, lam)
-        difference = "" if policy == reference else _interval(evaluation.difference(reference, policy, lam), 2, "+")
+        difference = "" if policy == reference else interval_text(evaluation.difference(reference, policy, lam), 2, "+")
         rows.append(
             (
                 s["return"].mean,
                 (
                     policy,
-                    _interval(s["return"], 1),
+                    interval_text(s["return"], 1),
                     difference,
-                    _interval(s["rms_m"], 3),
-                    _interval(s["energy_mj"], 4),
+                    interval_text(s["rms_m"], 3),
+                    interval_text(s["energy_mj"], 4),
                     f"{s['members'].mean:.1f}",
                     f"{s['lost'].mean:.2f}",
                 ),
@@ -34,7 +34,8 @@ def table_rows(evaluation: Evaluation, lam: float, reference: str) -> list[tuple
     return [row for _, row in sorted(rows, key=lambda pair: -pair[0])]
 
 
-def _interval(value, digits: int, sign: str = "") -> str:
+def interval_text(value, digits: int, sign: str = "") -> str:
+    """mean [low, high] of a Summary."""
     return f"{value.mean:{sign}.{digits}f} [{value.low:{sign}.{digits}f}, {value.high:{sign}.{digits}f}]"
 
 

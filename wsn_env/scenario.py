@@ -57,6 +57,10 @@ class Scenario(Section):
     lam: float | tuple[float, float] = 4.0  # m/mJ; a pair (low, high): drawn log-uniformly for each episode
     typical_error_m: float = quantity(1.0, "error of a good schedule: the scale of a learner's rewards", above=0)
     typical_energy_mj: float = quantity(0.3, "its energy in a period", above=0)
+    # The hypervolume's reference point: the error of the head alone, the energy of every node within sensing range,
+    # both measured (nearest0; static_cluster or the scenario's own policy) and rounded up past their intervals.
+    reference_error_m: float = quantity(1.5, "mean error that a point of a front must stay below", above=0)
+    reference_energy_mj: float = quantity(0.4, "energy in a period that it must stay below", above=0)
     field: Field = Field()
     motion: Motion = Crossing()
     detection: Detection | Threshold = Detection()
@@ -121,17 +125,19 @@ class Scenario(Section):
         return float(pair[0]), float(pair[1])
 
     @property
-    def lam_span(self) -> tuple[float, float]:
-        """The trade-offs that matter [m/mJ]: from a tenth to ten times of what makes the typical error and the typical
-        energy cost the same, a little less (0.3 to 30 for PreDC-v0)."""
-        even = self.typical_error_m / self.typical_energy_mj
-        return round(0.09 * even, 12), round(9 * even, 12)
+    def lam_balance(self) -> float:
+        """Where the typical error and the typical energy cost about the same, to one digit [m/mJ]."""
+        return float(f"{self.typical_error_m / self.typical_energy_mj:.1g}")
 
     @property
-    def lam_sweep(self) -> tuple[float, ...]:
-        """Octaves in `lam_span`, to compare at (0.5, 1, .. 16 for PreDC-v0)."""
-        even = self.typical_error_m / self.typical_energy_mj
-        return tuple(float(f"{0.15 * 2**k * even:.3g}") for k in range(6))
+    def lam_span(self) -> tuple[float, float]:
+        """The trade-offs that matter [m/mJ]: from precise to frugal, 0.3 to 30 for PreDC-v0."""
+        return float(f"{self.lam_balance / 10:.2g}"), float(f"{self.lam_balance * 10:.2g}")
+
+    @property
+    def lam_octaves(self) -> tuple[float, ...]:
+        """Six of them to compare at [m/mJ]: 0.5, 1, 2, 4, 8, 16 for PreDC-v0."""
+        return tuple(float(f"{self.lam_balance * 2**k / 6:.3g}") for k in range(6))
 
     @property
     def locates(self) -> bool:
@@ -246,12 +252,14 @@ class Scenario(Section):
 
 PRESETS = {
     "PreDC-v0": Scenario(name="PreDC-v0"),
-    "Rssi-v0": Scenario(name="Rssi-v0", measurement=Rssi()),
+    "Rssi-v0": Scenario(name="Rssi-v0", reference_error_m=4.0, measurement=Rssi()),
     "Binary-v0": Scenario(
         name="Binary-v0",
         periods=50,
         lam=2.0,
         typical_error_m=1.5,
+        reference_error_m=30.0,
+        reference_energy_mj=1.0,
         field=Field(nodes=600, side_m=500.0),
         motion=Crossing(margin_m=60.0, crossing_m=250.0, acceleration_ms2=0.1),
         detection=Detection(radius_m=60.0, softness=1e-6, ceiling=1.0),
@@ -263,6 +271,8 @@ PRESETS = {
         name="Anchors-v0",
         lam=10.0,
         typical_error_m=11.0,
+        reference_error_m=40.0,
+        reference_energy_mj=3.0,
         periods=50,
         field=Field(side_m=200.0, positions=RING_OF_EIGHT),
         motion=Crossing(margin_m=20.0, crossing_m=80.0, acceleration_ms2=0.5),
@@ -277,6 +287,8 @@ PRESETS = {
         lam=0.006,
         typical_error_m=16.0,
         typical_energy_mj=1400.0,
+        reference_error_m=75.0,
+        reference_energy_mj=2200.0,
         field=Field(nodes=64, side_m=1000.0, layout="grid"),
         motion=Cruise(),
         detection=Threshold(),

@@ -28,7 +28,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         autoreset_mode: "NextStep" (Gymnasium's default), "SameStep", or "Disabled": then rows are started anew by
             `reset(options={"reset_mask": (B,) bool})`.
         threads: cores to share a large batch; None: all that the process may use. No bit depends on it.
-        The rest: as ClusterEnv.
+        The rest: as ClusterEnv. A vector reward has the shape (B, 2); `reward_space` and `reward_dim` are of one row.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10, "autoreset_mode": AutoresetMode.NEXT_STEP}
@@ -63,6 +63,8 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self.single_observation_space = self.interface.observation.space
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
+        if self.interface.reward_space is not None:
+            self.reward_space, self.reward_dim = self.interface.reward_space, 2
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._state: State | None = None
         self._view: View | None = None

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from wsn_env.interface.actions import make_action
 from wsn_env.interface.observations import make_observation
-from wsn_env.interface.rewards import make_reward
+from wsn_env.interface.rewards import make_reward, reward_space
 from wsn_env.scenario import Scenario
 
 
@@ -28,3 +28,4 @@ class Interface:
             settings.observation, scenario, settings.order, settings.candidates, threads
         )
         self.reward = make_reward(settings.reward)
+        self.reward_space = reward_space(settings.reward)

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 TOLD = (
     "error_m",
     "energy_mj",
@@ -27,9 +29,11 @@ def measures(outcome: Mapping[str, Any], lam, reward) -> dict[str, Any]:
     Args:
         outcome: the fields of OUTCOME by name, arrays (B, ...) or the numbers of one row.
         lam: (B,) or a number.
-        reward: of the period; its two parts are told apart here.
+        reward: of the period; its two parts are told apart here. Of a vector reward, too, they are the parts of the
+            mission's reward at this lam.
     """
     info = {name: outcome[name] for name in TOLD}
     info["reward_energy"] = -lam * outcome["energy_mj"]
-    info["reward_error"] = reward - info["reward_energy"]
+    vector = np.ndim(reward) > np.ndim(lam)
+    info["reward_error"] = -outcome["error_m"] if vector else reward - info["reward_energy"]
     return info

@@ -1,8 +1,9 @@
-"""Rewards: minus (error + lam * energy), in metres."""
+"""Rewards: minus (error + lam * energy), in metres; or minus each of the two, for learners of several objectives."""
 
 from functools import partial
 
 import numpy as np
+from gymnasium.spaces import Box
 
 from wsn_env.quantity import suggest
 
@@ -23,7 +24,17 @@ def belief_cost(outcome):
     return np.where(wrong, outcome["error_m"], outcome["believed_error_m"])
 
 
-REWARDS = {"error": error_cost, "belief": belief_cost}
+def vector_reward(outcome, lam):
+    """MO-Gymnasium's: [-error in m, -energy in mJ], (..., 2) float32; the weight (1, lam) makes the mission's of it.
+
+    A fresh array at each call, for MO-Gymnasium's wrappers write into it.
+    """
+    return -np.stack([outcome["error_m"], outcome["energy_mj"]], axis=-1).astype(np.float32)
+
+
+COSTS = {"error": error_cost, "belief": belief_cost}
+VECTOR = "vector"
+REWARDS = (*COSTS, VECTOR)
 
 
 def make_reward(name: str):
@@ -34,7 +45,12 @@ def make_reward(name: str):
     """
     if name not in REWARDS:
         raise ValueError(f"reward {name!r} is unknown: {suggest(name, REWARDS)}")
-    return partial(_reward, REWARDS[name])
+    return vector_reward if name == VECTOR else partial(_reward, COSTS[name])
+
+
+def reward_space(name: str) -> Box | None:
+    """The space of one row's vector reward, as MO-Gymnasium asks for; None for a reward of one number."""
+    return Box(-np.inf, 0.0, (2,), np.float32) if name == VECTOR else None
 
 
 def _reward(cost, outcome, lam):
