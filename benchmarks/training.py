@@ -107,7 +107,8 @@ def child(arguments: list[str]) -> None:
 
 def load_kernels(rows: int) -> None:
     """Run every kernel once."""
-    envs = ClusterVectorEnv(rows, "PreDC-v0", reward="belief", autoreset_mode="Disabled", particles=2, periods=1)
+    settings = dict(reward="belief", observation="menu", autoreset_mode="Disabled")
+    envs = ClusterVectorEnv(rows, "PreDC-v0", particles=2, periods=1, **settings)
     envs.reset(seed=0)
     envs.step(np.zeros(rows, np.int64))
 

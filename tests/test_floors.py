@@ -42,8 +42,9 @@ FLOORS = {
     "wsn_env.cli": 9,
     "wsn_env.__main__": 9,
     "train": 9,
+    "studies": 10,
 }
-FILES = [p for folder in ("wsn_env", "agents", "benchmarks") for p in sorted((ROOT / folder).rglob("*.py"))]
+FILES = [p for folder in ("wsn_env", "agents", "benchmarks", "studies") for p in sorted((ROOT / folder).rglob("*.py"))]
 FILES.append(ROOT / "train.py")
 
 
@@ -68,7 +69,7 @@ def imports_of(path: Path) -> set[str]:
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}: imports are absolute"
             names |= {f"{node.module}.{alias.name}" for alias in node.names}
-    return {name for name in names if name.partition(".")[0] in ("wsn_env", "agents", "benchmarks", "train")}
+    return {name for name in names if name.partition(".")[0] in ("wsn_env", "agents", "benchmarks", "studies", "train")}
 
 
 @pytest.mark.parametrize("path", FILES, ids=module_of)

@@ -1,0 +1,1 @@
+"""Studies of learning: long, resumable, reported in docs/learning.md."""
