@@ -21,8 +21,8 @@ class SB3VecEnv(VecEnv):
 
     Args:
         envs: in same-step or disabled autoreset mode. Next-step's extra reset row is no transition: it is refused.
-        scaled: rewards are divided by the cost of a period that the scenario calls typical, so that their size is
-            alike for every scenario and lam.
+        scaled: rewards are divided by the scenario's `typical_cost`, so that their size is alike for every scenario and
+            lam.
         calibrated: the part of the reward that stands for the error is multiplied by the ratio of all true errors so
             far to it, so that a believed error costs on average what the true one does: filters believe too little or
             too much of themselves.
@@ -90,17 +90,13 @@ class SB3VecEnv(VecEnv):
         if self._calibrated:
             rewards = self._calibrate(rewards, info)
         # A copy in float32: stable-baselines3 adds the bootstrapped value in place.
-        return observation, (rewards / self._scale(lam)).astype(np.float32), done, infos
+        scale = self.envs.scenario.typical_cost(lam) if self._scaled else 1.0
+        return observation, (rewards / scale).astype(np.float32), done, infos
 
     def _calibrate(self, rewards: np.ndarray, info: dict) -> np.ndarray:
         self._errors += info["error_m"].sum(), -info["reward_error"].sum()
         ratio = self._errors[0] / self._errors[1] if self._errors[1] > 0 else 1.0
         return rewards + (ratio - 1.0) * info["reward_error"]
-
-    def _scale(self, lam: np.ndarray) -> np.ndarray:
-        scenario = self.envs.scenario
-        cost = scenario.typical_error_m + scenario.typical_energy_mj * lam
-        return cost if self._scaled else np.ones_like(cost)
 
     def close(self) -> None:
         """Close the environments."""

@@ -2,8 +2,8 @@
 
     python -m studies.algorithms --scenario Rssi-v0 --out out/algorithms
 
-MaskablePPO and RecurrentPPO (sb3-contrib) choose from the menu, SAC (stable-baselines3) sets the cluster's radius. All see the
-menu's observation flat. Needs the extra `study`.
+MaskablePPO and RecurrentPPO (sb3-contrib) choose from the menu, SAC (stable-baselines3) sets the cluster's radius. All
+see the menu's observation flat. Needs the extra `study`.
 """
 
 from __future__ import annotations

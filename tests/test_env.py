@@ -103,7 +103,7 @@ def test_sixty_four_rows_equal_sixty_four_environments(scenario):
         envs = gym.make_vec(name, num_envs=rows, vectorization_mode="vector_entry_point", threads=threads)
         first, _ = envs.reset(seed=seed)
         rng = np.random.default_rng(0)
-        runs.append([first] + [envs.step(rng.integers(0, 19, rows))[:2] for _ in range(12)])
+        runs.append([first] + [envs.step(rng.integers(0, 28, rows))[:2] for _ in range(12)])
     assert all(same(a, b) for a, b in zip(*[[x for pair in run[1:] for x in pair] for run in runs]))
     for i in range(0, rows, 9):
         env = gym.make(name)
@@ -111,7 +111,7 @@ def test_sixty_four_rows_equal_sixty_four_environments(scenario):
         assert same(observation, runs[0][0][i])
         rng = np.random.default_rng(0)
         for batch_observation, batch_reward in runs[0][1:]:
-            observation, reward, *_ = env.step(rng.integers(0, 19, rows)[i])
+            observation, reward, *_ = env.step(rng.integers(0, 28, rows)[i])
             assert same(observation, batch_observation[i]) and reward == batch_reward[i]
 
 
@@ -290,7 +290,7 @@ def test_bad_keywords_name_themselves(keywords, words):
 @pytest.mark.parametrize(
     "action,bad",
     [
-        ("menu", 19),
+        ("menu", 28),
         ("menu", -1),
         ("subset", np.full(13, 2)),
         ("nodes", np.zeros(3, int)),

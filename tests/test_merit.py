@@ -11,7 +11,7 @@ from wsn_env.interface.merit import gain
 from wsn_env.physics.constants import constants
 from wsn_env.types import KEEP_CLUSTER
 
-MOVE_WITH_ALL = 18  # the menu's last entry: the best node leads, the next eight follow
+MOVE_WITH_ALL = 18  # the best node leads, the next eight follow
 
 
 @kernel

@@ -35,7 +35,7 @@ def test_adapter_equals_dummy_vec_env(mode, observation, action):
     for _ in range(300):
         actions = np.array([ours.action_space.sample() for _ in range(rows)])
         if action == "menu":
-            actions = rng.integers(0, 19, rows)
+            actions = rng.integers(0, 28, rows)
         left, right = ours.step(actions), theirs.step(actions)
         assert all(same(a, b) for a, b in zip(left[:3], right[:3]))
         for i in np.flatnonzero(left[2]):
@@ -74,7 +74,7 @@ def test_scaled_rewards_and_wrappers():
         envs.reset()
     a, b, _ = (envs.step(np.full(rows, 13)) for envs in (plain, scaled, stacked))
     assert np.allclose(a[1], b[1] * 2.2, rtol=1e-6) and a[1].dtype == np.float32
-    assert np.array(plain.env_method("action_masks", indices=[0, 2])).shape == (2, 19)
+    assert np.array(plain.env_method("action_masks", indices=[0, 2])).shape == (2, 28)
 
 
 @pytest.mark.parametrize("name", [name for name in policy_names() if name != "ppo"])

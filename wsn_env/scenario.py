@@ -129,6 +129,16 @@ class Scenario(Section):
         """Where the typical error and the typical energy cost about the same, to one digit [m/mJ]."""
         return float(f"{self.typical_error_m / self.typical_energy_mj:.1g}")
 
+    def typical_cost(self, lam):
+        """What a period of a good schedule costs at this lam, about [m]: the scale of a learner's rewards.
+
+        A schedule that lam suits pays for less energy the dearer it is, hence the root.
+
+        Args:
+            lam: (...,) m/mJ.
+        """
+        return self.typical_error_m * np.sqrt(1.0 + lam * self.typical_energy_mj / self.typical_error_m)
+
     @property
     def lam_span(self) -> tuple[float, float]:
         """The trade-offs that matter [m/mJ]: from precise to frugal, 0.3 to 30 for PreDC-v0."""

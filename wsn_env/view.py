@@ -28,7 +28,6 @@ class View:
     network: Network
     reports: Reports
     _nearest: dict = field(default_factory=dict, repr=False)
-    _orders: dict = field(default_factory=dict, repr=False)
 
     period = _field("row", "period", "(B,) periods done.")
     lam = _field("row", "lam", "(B,) m/mJ.")
@@ -123,14 +122,6 @@ class View:
     def remember_nearest(self, nodes: np.ndarray, distances: np.ndarray, ring_m: float = 0.0) -> None:
         """What a kernel has found in passing."""
         self._nearest[nodes.shape[1], ring_m] = nodes, distances
-
-    def orders(self, order: str) -> np.ndarray | None:
-        """(B, 2, K) candidates in the menu's order of merit, if the head stays and if it moves; None: not known."""
-        return self._orders.get(order)
-
-    def remember_orders(self, order: str, nodes: np.ndarray) -> None:
-        """What a kernel has found in passing."""
-        self._orders[order] = nodes
 
     def nearest_living(self) -> np.ndarray:
         """(B,) the living node nearest to the prediction; -1: none is alive."""

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 from gymnasium import spaces
 
-from wsn_env.compiling import lean_kernel, lean_piece
-from wsn_env.interface.merit import ORDERS, order_by_merit
+from wsn_env.compiling import lean_kernel
+from wsn_env.interface.merit import KEEP, ORDERS, rank_row
 from wsn_env.physics.constants import constants
 from wsn_env.quantity import suggest
 from wsn_env.scenario import Scenario
@@ -15,83 +15,69 @@ from wsn_env.types import KEEP_CLUSTER, Cluster
 from wsn_env.view import View
 
 MENU_MEMBERS = 8  # the menu's largest number of further members
-MENU_ENTRIES = 1 + 2 * (MENU_MEMBERS + 1)
+GROUP = MENU_MEMBERS + 1  # entries for each rule of who leads: KEEP, BEST, AHEAD
+MENU_ENTRIES = 1 + 3 * GROUP
 
 
 class MenuAction:
-    """Discrete(19): 0 keeps the cluster as it is; 1 + n keeps the head, 10 + n moves it to the best node, each with
-    the n best further members, n = 0..8. Without a living head, keeping it means moving it."""
+    """Discrete(28): 0 keeps the cluster as it is. 1 + n keeps the head, 10 + n moves it to the best node, 19 + n to the
+    node nearest to a point 0.3 sensing radii ahead of the prediction; each with the n best further members, n = 0..8.
+    Without a living head, keeping it means moving it to the best."""
 
     def __init__(self, scenario: Scenario, order: str, candidates: int):
         if candidates <= MENU_MEMBERS:
             raise ValueError(f"candidates = {candidates}: the menu needs at least {MENU_MEMBERS + 1}")
         self.space = spaces.Discrete(MENU_ENTRIES)
-        self._order, self._candidates, self._ring_m = order, candidates, scenario.ring_m
+        self._by, self._candidates, self._ring_m = ORDERS.index(order), candidates, scenario.ring_m
         self._constants = constants(scenario)
 
     def cluster(self, action, view: View) -> Cluster:
         """The cluster that the menu's entries name."""
         rows = len(view.row)
         actions = np.ascontiguousarray(_whole_numbers(action, self.space, rows), np.int64)
-        nodes = self._ordered(actions, view)
-        heads, members = np.empty(rows, np.int64), np.empty((rows, MENU_MEMBERS + 1), np.int32)
-        if _read_menu(0, rows, actions, nodes, view.network.row, heads, members):
+        nodes = view.nearest(self._candidates, self._ring_m)[0]
+        heads, members = np.empty(rows, np.int64), np.empty((rows, GROUP), np.int32)
+        room = np.empty(nodes.shape), np.empty(nodes.shape, np.int64), np.empty(nodes.shape)
+        seen = view.network.row, view.positions, view.row, view.belief
+        if _read_menu(0, rows, self._constants, self._by, actions, nodes, *seen, *room, heads, members):
             raise _refusal(action, self.space)
         return Cluster(heads, members)
 
-    def _ordered(self, actions, view: View) -> np.ndarray:
-        """(B, K) candidates in order of merit, -1 at the end."""
-        nodes = view.nearest(self._candidates, self._ring_m)[0]
-        if self._order == "nearest":
-            return nodes
-        moves = _moves.py_func(actions, view.head)
-        if view.orders(self._order) is not None:
-            return np.where(moves[:, None], view.orders(self._order)[:, 1], view.orders(self._order)[:, 0])
-        ordered, kept = np.empty_like(nodes), np.where(moves, -1, view.head)
-        lam = view.lam.copy() if self._order == "value" else np.zeros(len(nodes))
-        order_by_merit(0, len(nodes), self._constants, view.positions, kept, view.belief, lam, nodes, ordered)
-        return ordered
-
     def masks(self, view: View) -> np.ndarray:
-        """(B, 19) bool: what differs from all smaller entries; counts beyond the living, or keeping no head, do not."""
+        """(B, 28) bool: what differs from all smaller entries; counts beyond the living, or keeping no head, do not."""
         living = (view.nearest(self._candidates, self._ring_m)[0] >= 0).sum(axis=1)
-        n = np.arange(MENU_MEMBERS + 1)
+        n = np.arange(GROUP)
         standing = view.head >= 0
         valid = np.ones((len(living), self.space.n), dtype=bool)
-        valid[:, 1 : MENU_MEMBERS + 2] = standing[:, None] & (n <= np.maximum(living - 1, 0)[:, None])
-        valid[:, MENU_MEMBERS + 2 :] = n <= (living - 1)[:, None]
+        valid[:, 1 : 1 + GROUP] = standing[:, None] & (n <= np.maximum(living - 1, 0)[:, None])
+        valid[:, 1 + GROUP :] = np.tile(n <= (living - 1)[:, None], 2)
         return valid
 
 
-@lean_piece
-def _moves(action, head):
-    """Whether an entry gives the head's role to the best node."""
-    return (action > MENU_MEMBERS + 1) | (head < 0)
-
-
 @lean_kernel
-def _read_menu(start, stop, actions, nodes, standing, heads, members):
-    """Fill heads (B,) and members (B, M) from the menu's entries and the candidates in order of merit.
+def _read_menu(start, stop, cs, by, actions, nodes, standing, positions, rows, beliefs, *room_and_choice):
+    """Fill heads (B,) and members (B, M) from the menu's entries and the candidates (B, K).
 
     Returns: how many actions are not in the menu.
     """
+    detections, ordered, drops, heads, members = room_and_choice
     strange = 0
     for b in range(start, stop):
-        strange += actions[b] < 0 or actions[b] > 2 * (MENU_MEMBERS + 1)
-        head = standing[b].head
+        action, head = actions[b], standing[b].head
+        strange += action < 0 or action >= MENU_ENTRIES
         members[b] = -1
-        if actions[b] == 0 and head >= 0:
+        if action == 0 and head >= 0:
             heads[b] = KEEP_CLUSTER
             continue
-        left = (actions[b] - 1) % (MENU_MEMBERS + 1) if actions[b] > 0 else 0
-        heads[b] = head
-        if _moves(actions[b], head):  # the best leads
-            heads[b] = nodes[b, 0]
-            head = -1
-            left += 1
+        rule, left = (action - 1) // GROUP, (action - 1) % GROUP
+        if action <= 0:
+            rule, left = KEEP, 0
+        mean, cov, lam = beliefs[b].predicted_mean, beliefs[b].predicted_cov, rows[b].lam
+        room = detections[b], ordered[b], drops[b]
+        heads[b] = rank_row(by, rule, positions[b], head, mean, cov, lam, nodes[b], cs[0], *room)
         slot = 0
-        for node in nodes[b]:
-            if left > 0 and node >= 0 and node != head:
+        for node in ordered[b]:
+            if left > 0 and node >= 0 and node != heads[b]:
                 members[b, slot] = node
                 slot += 1
                 left -= 1

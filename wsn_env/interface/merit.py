@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wsn_env.compiling import kernel, lean_piece
+from wsn_env.compiling import lean_piece
 from wsn_env.numerics import exp, normal_cdf
 from wsn_env.physics.field import squared_distance
 from wsn_env.physics.radio import TO_HEAD, outside, transmission
@@ -10,6 +10,9 @@ from wsn_env.physics.sensing import BINARY, POSITION, detection_piece, strength_
 
 TWO_PI = 6.283185307179586
 ORDERS = ("nearest", "information", "value")
+NEAREST, INFORMATION, VALUE = range(len(ORDERS))
+KEEP, BEST, AHEAD = range(3)  # who leads
+LEAD = 0.3  # sensing radii
 
 
 @lean_piece
@@ -136,16 +139,41 @@ def order_row(positions, head, mean, cov, lam, nodes, c, detections, ordered, dr
         p00, p01, p11 = after
 
 
-@kernel
-def order_by_merit(start, stop, cs, positions, heads, beliefs, lams, nodes, ordered):
-    """`order_row` for every row.
+@lean_piece
+def rank_row(by, rule, positions, head, mean, cov, lam, nodes, c, detections, ordered, drops):
+    """Who would lead under a rule, and the candidates in the order that they would join.
 
     Args:
-        heads, lams: (B,).
-        nodes: (B, K) candidates, -1: none.
-        ordered: (B, K) filled.
+        by: place in ORDERS.
+        rule: KEEP: the present head, or the best if there is none; BEST: the first in the order; AHEAD: the candidate
+            nearest to a point LEAD sensing radii ahead of the prediction, which the target takes longer to leave.
+        The rest: as `order_row`.
+
+    Returns: the leader; -1: no candidate.
     """
-    detections, drops = np.empty(nodes.shape[1]), np.empty(nodes.shape[1])
-    for b in range(start, stop):
-        mean, cov = beliefs[b].predicted_mean, beliefs[b].predicted_cov
-        order_row(positions[b], heads[b], mean, cov, lams[b], nodes[b], cs[0], detections, ordered[b], drops)
+    leader = -1
+    if rule == KEEP:
+        leader = head
+    elif rule == AHEAD:
+        leader = _nearest_ahead(positions, mean, nodes, c)
+    if by == NEAREST:
+        for k in range(len(nodes)):
+            ordered[k] = nodes[k]
+    else:
+        price = lam if by == VALUE else 0.0
+        order_row(positions, leader, mean, cov, price, nodes, c, detections, ordered, drops)
+    return leader if leader >= 0 else ordered[0]
+
+
+@lean_piece
+def _nearest_ahead(positions, mean, nodes, c):
+    speed = np.sqrt(mean[1] * mean[1] + mean[3] * mean[3])
+    way = LEAD * c.radius_m / max(speed, 1e-9)
+    x, y = mean[0] + way * mean[1], mean[2] + way * mean[3]
+    best, shortest = -1, np.inf
+    for node in nodes:
+        if node >= 0:
+            squared = squared_distance(positions, node, x, y)
+            if squared < shortest:
+                best, shortest = node, squared
+    return best

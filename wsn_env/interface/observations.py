@@ -6,7 +6,7 @@ import numpy as np
 from gymnasium import spaces
 
 from wsn_env.compiling import lean_kernel, over_rows, threads_for
-from wsn_env.interface.actions import MENU_ENTRIES
+from wsn_env.interface.actions import GROUP, MENU_ENTRIES
 from wsn_env.interface.features import (
     BELIEF_FEATURES,
     BOUND,
@@ -16,7 +16,7 @@ from wsn_env.interface.features import (
     describe_candidate,
     describe_merit,
 )
-from wsn_env.interface.merit import ORDERS, order_row
+from wsn_env.interface.merit import ORDERS, order_row, rank_row
 from wsn_env.interface.prospects import ENTRY_FEATURES, describe_entries, describe_standing
 from wsn_env.physics.constants import constants
 from wsn_env.physics.field import find_candidates
@@ -26,7 +26,6 @@ from wsn_env.types import network_of
 from wsn_env.view import View
 
 G = len(BELIEF_FEATURES)
-NEAREST, INFORMATION, VALUE = range(len(ORDERS))
 
 
 @lean_kernel
@@ -77,44 +76,39 @@ def _encode_menu(
     start,
     stop,
     cs,
-    scale,
+    typical_mj,
     by,
+    units,
     which,
     nodes,
     distances,
     detections,
     drops,
-    orders,
+    ordered,
     out,
     rows,
     beliefs,
     reported,
     *network,
 ):
-    """Fill out (B, n): BELIEF_FEATURES, then ENTRY_FEATURES of each of the menu's entries; the candidates (B, K); and
-    their orders of merit if the head stays and if it moves (B, 2, K). Only in the rows marked in `which`."""
+    """Fill out (B, n): BELIEF_FEATURES, then ENTRY_FEATURES of each of the menu's entries; the candidates (B, K).
+    Only in the rows marked in `which`."""
     c, network, width = cs[0], network_of(network), len(ENTRY_FEATURES)
     for b in range(start, stop):
         if not which[b]:
             continue
         m, p, standing = beliefs[b].predicted_mean, beliefs[b].predicted_cov, network.row[b]
-        positions, members, head, lam = network.positions[b], network.members[b], standing.head, rows[b].lam
+        positions, members, lam = network.positions[b], network.members[b], rows[b].lam
         find_candidates(network, b, m[0], m[2], c.ring_m, nodes[b], distances[b])
         f = out[b]
-        ex, ey = describe_belief(b, rows, beliefs, reported, network, nodes[b], distances[b], c, f[:G])
-        describe_standing(positions, standing, members, m, p, ex, ey, lam, scale, c, f[G : G + width])
-        half = (len(f) - G - width) // 2
-        for moves in range(2):
-            kept, ordered = -1 if moves else head, orders[b, moves]
-            if by == NEAREST:
-                for k in range(len(ordered)):
-                    ordered[k] = nodes[b, k]
-            else:
-                price = lam if by == VALUE else 0.0
-                order_row(positions, kept, m, p, price, nodes[b], c, detections[b], ordered, drops[b])
-            leads = kept if kept >= 0 else ordered[0]
-            entries = f[G + width + moves * half : G + width + (1 + moves) * half]
-            describe_entries(positions, standing, members, ordered, leads, m, p, ex, ey, lam, scale, c, width, entries)
+        way = describe_belief(b, rows, beliefs, reported, network, nodes[b], distances[b], c, f[:G])
+        describe_standing(positions, standing, members, m, p, way, (lam, units[b], typical_mj), c, f[G : G + width])
+        room = detections[b], ordered[b], drops[b]
+        for rule in range(3):
+            leader = rank_row(by, rule, positions, standing.head, m, p, lam, nodes[b], c, *room)
+            first = G + width + rule * GROUP * width
+            entries, numbers = f[first : first + GROUP * width], (lam, units[b], typical_mj)
+            describe_entries(positions, standing, members, ordered[b], leader, m, p, way, numbers, c, width, entries)
         clip(f)
 
 
@@ -127,7 +121,7 @@ class CandidatesObservation:
         self.shape = (candidates, len(self.features))
         self.space = spaces.Box(-BOUND, BOUND, (G + candidates * self.shape[1],), np.float32)
         self._candidates, self._ring_m, self._threads = candidates, scenario.ring_m, threads
-        self._numbers = constants(scenario), scenario.radio.battery_j
+        self._scenario, self._constants = scenario, constants(scenario)
 
     def encode(self, view: View) -> np.ndarray:
         """(B, n) float32, fresh."""
@@ -145,15 +139,14 @@ class CandidatesObservation:
         return self._fill(last.copy(), view, rows)
 
     def _fill(self, out, view: View, rows):
-        ordered = np.empty((len(rows), self._candidates), np.int64)
-        return self._run(_encode_candidates, ordered, out, view, rows)
+        return self._run(_encode_candidates, (self._scenario.radio.battery_j,), out, view, rows)
 
-    def _run(self, kernel, ordered, out, view: View, rows):
+    def _run(self, kernel, numbers, out, view: View, rows):
         nodes, distances = view.nearest(self._candidates, self._ring_m)
-        room = np.empty(nodes.shape), np.empty(nodes.shape)
-        threads, seen = threads_for(rows, self._threads), (view.row, view.belief, view.reports.count)
-        arguments = *self._numbers, rows, nodes, distances, *room, ordered, out, *seen, *view.network.arrays()
-        over_rows(kernel, len(rows), threads, *arguments)
+        merit = np.empty(nodes.shape), np.empty(nodes.shape), np.empty(nodes.shape, np.int64)
+        room = rows, nodes, distances, *merit, out
+        seen = view.row, view.belief, view.reports.count, *view.network.arrays()
+        over_rows(kernel, len(rows), threads_for(rows, self._threads), self._constants, *numbers, *room, *seen)
         return out
 
 
@@ -166,19 +159,11 @@ class MenuObservation(CandidatesObservation):
         super().__init__(scenario, order, candidates, threads)
         self.shape = (MENU_ENTRIES, len(self.features))
         self.space = spaces.Box(-BOUND, BOUND, (G + MENU_ENTRIES * self.shape[1],), np.float32)
-        scale = np.array([scenario.typical_error_m, scenario.typical_energy_mj])
         self._order = order
-        self._numbers = constants(scenario), scale, ORDERS.index(order)
-
-    def renew(self, view: View, rows, before: View, last) -> np.ndarray:
-        """As CandidatesObservation's."""
-        view.remember_orders(self._order, before.orders(self._order).copy())
-        return super().renew(view, rows, before, last)
 
     def _fill(self, out, view: View, rows):
-        if view.orders(self._order) is None:
-            view.remember_orders(self._order, np.empty((len(rows), 2, self._candidates), np.int64))
-        return self._run(_encode_menu, view.orders(self._order), out, view, rows)
+        numbers = self._scenario.typical_energy_mj, ORDERS.index(self._order), self._scenario.typical_cost(view.lam)
+        return self._run(_encode_menu, numbers, out, view, rows)
 
 
 class DictObservation:

@@ -31,13 +31,13 @@ AHEAD = 3.0  # periods
 
 
 @lean_piece
-def describe_standing(positions, standing, members, m, p, ex, ey, lam, scale, c, f):
+def describe_standing(positions, standing, members, m, p, way, numbers, c, f):
     """Fill f with ENTRY_FEATURES of the standing cluster.
 
     Args:
         standing, members: the row's NETWORK and its members; without a head all features but `sd` are 0.
-        m, p: predicted mean and covariance; ex, ey: direction of its velocity.
-        scale: (typical error [m], typical energy [mJ]).
+        m, p: predicted mean and covariance; way: direction of its velocity.
+        numbers: lam [m/mJ], the scenario's typical cost at lam [m], its typical energy [mJ].
     """
     f[:] = 0.0
     f[0] = 1.0
@@ -47,12 +47,12 @@ def describe_standing(positions, standing, members, m, p, ex, ey, lam, scale, c,
         for k in range(standing.n_members):
             after, price, sums = _add(positions, members[k], standing.head, False, m, p, after, sums, c)
             energy += price
-        _write_head(positions, standing.head, m, p, ex, ey, c, f)
-    _write(standing.n_members, 0, p, after, energy, sums, lam, scale, f)
+        _write_head(positions, standing.head, m, p, way, c, f)
+    _write(standing.n_members, 0, p, after, energy, sums, numbers, f)
 
 
 @lean_piece
-def describe_entries(positions, standing, members, nodes, head, m, p, ex, ey, lam, scale, c, width, entries):
+def describe_entries(positions, standing, members, nodes, head, m, p, way, numbers, c, width, entries):
     """Fill entries (N * width,) with ENTRY_FEATURES of the head and the first n further nodes, n = 0..N - 1.
 
     Args:
@@ -80,8 +80,8 @@ def describe_entries(positions, standing, members, nodes, head, m, p, ex, ey, la
                 invited += called
         f[1] = 1.0 if head != old else 0.0
         if head >= 0:
-            _write_head(positions, head, m, p, ex, ey, c, f)
-        _write(n, invited, p, after, energy, sums, lam, scale, f)
+            _write_head(positions, head, m, p, way, c, f)
+        _write(n, invited, p, after, energy, sums, numbers, f)
 
 
 @lean_piece
@@ -150,17 +150,17 @@ def _report_j(positions, node, head, detection, m, c):
 
 
 @lean_piece
-def _write_head(positions, head, m, p, ex, ey, c, f):
+def _write_head(positions, head, m, p, way, c, f):
     dx, dy = (positions[head, 0] - m[0]) / c.radius_m, (positions[head, 1] - m[2]) / c.radius_m
-    f[12] = dx * ex + dy * ey
-    f[13] = dy * ex - dx * ey
+    f[12] = dx * way[0] + dy * way[1]
+    f[13] = dy * way[0] - dx * way[1]
     f[14] = np.sqrt(dx * dx + dy * dy)
     f[15] = mean_detection(positions, head, m, p, c)
 
 
 @lean_piece
-def _write(n, invited, p, after, energy, sums, lam, scale, f):
-    unit = scale[0] + lam * scale[1]
+def _write(n, invited, p, after, energy, sums, numbers, f):
+    lam, unit, typical_mj = numbers
     before = max(p[0, 0] + p[2, 2], 1e-12)
     left = max(after[0] + after[2], 1e-12)
     f[2] = 0.25 * n
@@ -169,7 +169,7 @@ def _write(n, invited, p, after, energy, sums, lam, scale, f):
     f[5] = 0.5 * log(left / before)
     f[6] = expected_error(after[0], after[1], after[2]) / unit
     f[7] = lam * energy / unit
-    f[8] = np.sqrt(energy / max(scale[1], 1e-9))
+    f[8] = np.sqrt(energy / typical_mj)
     f[9] = 0.25 * sums[0]
     f[10] = sums[1]
     f[11] = 1.0 - sums[2]
