@@ -129,7 +129,8 @@ def run_compile(command: Compile) -> None:
         for order in ("nearest", "information"):
             env = ClusterEnv(particles=20, periods=3, start="search", order=order, fast=fast)
             env.reset(seed=0)
-            env.step(10)
+            for _ in range(3):
+                env.step(10)
     scenarios = [Scenario.named("PreDC-v0", tracker=tracker) for tracker in ("particle", "snapshot", "ickf")]
     scenarios.append(Scenario.named("Binary-v0", nodes=20, tracker="boundary"))
     for tracker in ("grnn", "nonlinear_ls"):

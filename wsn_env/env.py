@@ -9,6 +9,7 @@ import gymnasium as gym
 import numpy as np
 
 from wsn_env import draws
+from wsn_env.bounds import Bound, bound_kind
 from wsn_env.interface import Interface, Settings
 from wsn_env.interface.info import measures
 from wsn_env.interface.render import check_render_mode, frame
@@ -64,6 +65,7 @@ class ClusterEnv(gym.Env):
         self._lam = 0.0
         self._squares = 0.0
         self._detections = 0
+        self._bound = None if bound_kind(self.scenario) == "none" else Bound(self.scenario)
 
     def reset(self, *, seed: int | None = None, options: dict | None = None):
         """A new episode: seed fixes field, track and every draw."""
@@ -74,7 +76,10 @@ class ClusterEnv(gym.Env):
         self._lam = self._state.lam.item()
         self._squares = 0.0
         self._detections = 0
-        return self._observe(), self._reward_and_info(outcome)[1]
+        info = self._reward_and_info(outcome)[1]
+        if self._bound is not None:
+            info["bound_m"] = self._bound.begin(self._state).item()
+        return self._observe(), info
 
     def step(self, action):
         """One period. Returns observation, reward, terminated (never), truncated, info."""
@@ -87,10 +92,16 @@ class ClusterEnv(gym.Env):
         reward, info = self._reward_and_info(outcome)
         self._squares += info["error_m"] * info["error_m"]
         self._detections += info["detections"]
+        if self._bound is not None:
+            info["bound_m"] = self._bound.advance(self._state, outcome).item()
         truncated = self._state.period.item() >= self.scenario.periods
         if truncated:
             info["episode_rms_m"] = math.sqrt(self._squares / self.scenario.periods)
             info["antnp"] = self._detections / self.scenario.periods
+            if self._bound is not None:
+                info["episode_bound_m"] = self._bound.episode_m().item()
+                if self._bound.kind == "bound":
+                    info["episode_floor_m"] = self._bound.floor_m(self._state).item()
         return self._observe(), reward, False, truncated, info
 
     def _reward_and_info(self, outcome: Outcome) -> tuple[float | np.ndarray, dict[str, Any]]:

@@ -12,7 +12,7 @@ import hashlib
 import json
 import platform
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from wsn_env import draws
+from wsn_env.bounds import Bound, bound_kind
 from wsn_env.compiling import kernels_stamp
 from wsn_env.files import replacing
 from wsn_env.policies import Policy, make_policy
@@ -32,7 +33,8 @@ from wsn_env.world import World
 BLOCK = 50
 FIRST_SEED, SEEDS_PER_RUN = 2**31, 10**5  # training seeds lie below FIRST_SEED
 COLUMNS = (
-    "policy scenario lam episode seed periods return error_m rms_m energy_mj members handovers searches lost bound_m"
+    "policy scenario lam episode seed periods return error_m rms_m energy_mj members handovers searches lost"
+    " bound_m floor_m"
 ).split()
 MEANS = ("return", "rms_m", "error_m", "energy_mj", "members", "handovers", "searches", "lost")
 RESAMPLES = 2000
@@ -50,16 +52,31 @@ class Summary:
     @classmethod
     def of(cls, values) -> Summary:
         """Percentile bootstrap over episodes, with a fixed seed; no interval for a single episode."""
-        from scipy.stats import bootstrap
-
         values = np.asarray(values, dtype=float)
         if len(values) < 2 or np.ptp(values) == 0:
             return cls(float(values.mean()), float(values.min()), float(values.max()))
-        rng = np.random.default_rng(0)
-        interval = bootstrap(
-            (values,), np.mean, n_resamples=RESAMPLES, method="percentile", rng=rng
-        ).confidence_interval
-        return cls(float(values.mean()), float(interval.low), float(interval.high))
+        return cls(float(values.mean()), *_interval(np.mean, values))
+
+    @classmethod
+    def of_root_ratio(cls, values, references) -> Summary:
+        """sqrt(mean(values) / mean(references)) of pairs, the interval as in `of`."""
+        ratio = _root_ratio(values, references)
+        if len(values) < 2:
+            return cls(float(ratio), float(ratio), float(ratio))
+        return cls(float(ratio), *_interval(_root_ratio, values, references))
+
+
+def _interval(statistic, *paired) -> tuple[float, float]:
+    from scipy.stats import bootstrap
+
+    rng = np.random.default_rng(0)
+    settings = dict(n_resamples=RESAMPLES, method="percentile", paired=len(paired) > 1, rng=rng)
+    interval = bootstrap(paired, statistic, **settings).confidence_interval
+    return float(interval.low), float(interval.high)
+
+
+def _root_ratio(values, references, axis=-1):
+    return np.sqrt(np.mean(values, axis=axis) / np.mean(references, axis=axis))
 
 
 @dataclass(frozen=True)
@@ -81,6 +98,18 @@ class Evaluation:
         """Means with intervals of the quantities in MEANS."""
         return {column: Summary.of(self.values(policy, lam, column)) for column in MEANS}
 
+    def rms_over_bound(self, policy: str, lam: float) -> Summary | None:
+        """Root of the mean squared error over the mean squared bound, of all episodes; None: there is no bound."""
+        if bound_kind(self.scenario) == "none":
+            return None
+        return Summary.of_root_ratio(*(self.values(policy, lam, column) ** 2 for column in ("rms_m", "bound_m")))
+
+    def floor_m(self) -> float | None:
+        """Root of the mean squared floor, the same for every policy; None: there is no bound."""
+        if bound_kind(self.scenario) == "none":
+            return None
+        return float(np.sqrt(np.mean(self.values(self.policies[0], self.lams[0], "floor_m") ** 2)))
+
     def difference(self, policy: str, reference: str, lam: float, column: str = "return") -> Summary:
         """Paired difference policy - reference over the common episodes."""
         return Summary.of(self.values(policy, lam, column) - self.values(reference, lam, column))
@@ -97,11 +126,18 @@ class Evaluation:
             {"policy": policy, "lam": lam}
             | {column: vars(value) for column, value in self.summary(policy, lam).items()}
             | {f"return_minus_{self.policies[0]}": vars(self.difference(policy, self.policies[0], lam))}
+            | self._against_the_bound(policy, lam)
             for lam in self.lams
             for policy in self.policies
         ]
         with replacing(out / "evaluation.json") as path:
             path.write_text(json.dumps(self.settings() | {"versions": versions(), "means": means}, indent=1))
+
+    def _against_the_bound(self, policy: str, lam: float) -> dict:
+        ratio = self.rms_over_bound(policy, lam)
+        return (
+            {} if ratio is None else {f"rms_over_{bound_kind(self.scenario)}": vars(ratio), "floor_m": self.floor_m()}
+        )
 
     def settings(self) -> dict:
         """What was asked for."""
@@ -117,9 +153,16 @@ def evaluation_seeds(seed: int, episodes: int) -> list[int]:
     return [FIRST_SEED + seed * SEEDS_PER_RUN + episode for episode in range(episodes)]
 
 
-def episodes(policy: Policy, world: World, seeds: Sequence[int]) -> Iterator[tuple[State, Outcome]]:
-    """Play one episode for each seed, a row each; gives state and outcome after every period."""
+def episodes(
+    policy: Policy, world: World, seeds: Sequence[int], begin: Callable[[State], object] | None = None
+) -> Iterator[tuple[State, Outcome]]:
+    """Play one episode for each seed, a row each; gives state and outcome after every period.
+
+    `begin` is called with the state before the first.
+    """
     state = world.reset(np.array([draws.key_of_seed(seed) for seed in seeds], dtype=np.uint64))
+    if begin is not None:
+        begin(state)
     for _ in range(world.scenario.periods):
         state, outcome = world.step(state, policy.act(View.of(state)), donate=True)
         yield state, outcome
@@ -137,7 +180,8 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict]:
     """
     scenario = world.scenario
     sums = dict.fromkeys(("error", "square", "energy", "members", "handovers", "searches", "lost"), 0.0)
-    for state, outcome in episodes(policy, world, seeds):  # noqa: B007 - lam is read from the last
+    bound = None if bound_kind(scenario) == "none" else Bound(scenario, len(seeds), world.threads)
+    for state, outcome in episodes(policy, world, seeds, bound and bound.begin):
         sums["error"] += outcome.error_m
         sums["square"] += outcome.error_m**2
         sums["energy"] += outcome.energy_mj
@@ -145,6 +189,8 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict]:
         sums["handovers"] += outcome.handover
         sums["searches"] += outcome.searched
         sums["lost"] += outcome.error_m > 2 * scenario.radius_m
+        if bound is not None:
+            bound.advance(state, outcome)
     n = scenario.periods
     columns = {
         "lam": state.lam,
@@ -157,6 +203,8 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict]:
         "handovers": sums["handovers"].astype(int),
         "searches": sums["searches"].astype(int),
         "lost": sums["lost"].astype(int),
+        "bound_m": np.full(len(seeds), "") if bound is None else bound.episode_m(),
+        "floor_m": np.full(len(seeds), "") if bound is None else bound.floor_m(state),
     }
     return [{name: values[i].item() for name, values in columns.items()} for i in range(len(seeds))]
 
@@ -212,7 +260,6 @@ def evaluate(
                         "scenario": scenario.name,
                         "episode": episode,
                         "seed": block[i],
-                        "bound_m": "",
                     }
                     rows.append({column: (row | values)[column] for column in COLUMNS})
                 done += 1

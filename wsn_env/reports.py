@@ -2,13 +2,35 @@
 
 from __future__ import annotations
 
+from math import pi, sqrt
 from pathlib import Path
 
+from wsn_env.bounds import bound_kind
 from wsn_env.evaluation import Evaluation
 from wsn_env.files import replacing
 
-EMPHASIS, FAMILY, OTHER = "#D55E00", "#0072B2", "#333333"
-HEADER = ("policy", "return", "{} minus it", "RMS m", "energy mJ/period", "awake", "lost")
+EMPHASIS, FAMILY, OTHER, FLOOR = "#D55E00", "#0072B2", "#333333", "#009E73"
+HEADER = ("policy", "return", "{} minus it", "RMS m", "RMS / {}", "energy mJ/period", "awake", "lost")
+ROUND = sqrt(pi) / 2  # mean error over RMS of a round Gaussian in the plane
+
+
+def table_header(evaluation: Evaluation, reference: str) -> list[str]:
+    """Names of the columns of `table_rows`."""
+    kind = bound_kind(evaluation.scenario)
+    names = [name.format(reference if "minus" in name else kind) for name in HEADER]
+    return [name for name in names if name != "RMS / none"]
+
+
+def about_the_bound(evaluation: Evaluation) -> str:
+    """What the column of the bound holds, in a sentence."""
+    floor = evaluation.floor_m()
+    if floor is None:
+        return "no Cramer-Rao bound: a bit that jumps at an edge has no Fisher information"
+    what = {
+        "bound": "posterior Cramer-Rao bound of the reports delivered",
+        "reference": "the Cramer-Rao recursion of the reports delivered, which can be beaten here: no bound",
+    }[bound_kind(evaluation.scenario)]
+    return f"RMS over the {what}; the same for all nodes awake and heard: {floor:.3f} m"
 
 
 def table_rows(evaluation: Evaluation, lam: float, reference: str) -> list[tuple[str, ...]]:
@@ -16,6 +38,7 @@ def table_rows(evaluation: Evaluation, lam: float, reference: str) -> list[tuple
     rows = []
     for policy in evaluation.policies:
         s = evaluation.summary(policy, lam)
+        ratio = evaluation.rms_over_bound(policy, lam)
         difference = "" if policy == reference else interval_text(evaluation.difference(reference, policy, lam), 2, "+")
         rows.append(
             (
@@ -25,6 +48,7 @@ def table_rows(evaluation: Evaluation, lam: float, reference: str) -> list[tuple
                     interval_text(s["return"], 1),
                     difference,
                     interval_text(s["rms_m"], 3),
+                    *([] if ratio is None else [interval_text(ratio, 2)]),
                     interval_text(s["energy_mj"], 4),
                     f"{s['members'].mean:.1f}",
                     f"{s['lost'].mean:.2f}",
@@ -44,7 +68,7 @@ def wide_console():
     from rich.console import Console
 
     console = Console()
-    return console if console.is_terminal else Console(width=140)
+    return console if console.is_terminal else Console(width=160)
 
 
 def print_tables(evaluation: Evaluation, reference: str | None = None, console=None) -> None:
@@ -55,11 +79,10 @@ def print_tables(evaluation: Evaluation, reference: str | None = None, console=N
     console = console or wide_console()
     for lam in evaluation.lams:
         title = f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes"
-        table = Table(
-            title=title, caption=f"means, 95 % bootstrap intervals; {reference} minus it: paired difference of returns"
-        )
-        for name in HEADER:
-            table.add_column(name.format(reference), justify="left" if name == "policy" else "right")
+        caption = f"means, 95 % bootstrap intervals; {reference} minus it: paired difference of returns"
+        table = Table(title=title, caption=f"{caption}; {about_the_bound(evaluation)}")
+        for name in table_header(evaluation, reference):
+            table.add_column(name, justify="left" if name == "policy" else "right")
         for row in table_rows(evaluation, lam, reference):
             table.add_row(*row)
         console.print(table)
@@ -68,7 +91,7 @@ def print_tables(evaluation: Evaluation, reference: str | None = None, console=N
 def markdown_table(evaluation: Evaluation, lam: float, reference: str) -> str:
     """The same as Markdown."""
     lines = [
-        "| " + " | ".join(name.format(reference) for name in HEADER) + " |",
+        "| " + " | ".join(table_header(evaluation, reference)) + " |",
         "|---" + "|--:" * (len(HEADER) - 1) + "|",
     ]
     return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in table_rows(evaluation, lam, reference)]) + "\n"
@@ -79,6 +102,7 @@ def save_markdown(evaluation: Evaluation, folder: str | Path) -> None:
     parts = [
         f"## {evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes\n\n"
         + markdown_table(evaluation, lam, evaluation.policies[0])
+        + f"\nMeans with 95 % bootstrap intervals; {about_the_bound(evaluation)}.\n"
         for lam in evaluation.lams
     ]
     with replacing(Path(folder) / "evaluation.md") as path:
@@ -88,7 +112,8 @@ def save_markdown(evaluation: Evaluation, folder: str | Path) -> None:
 def draw_front(evaluation: Evaluation, lam: float, path: str | Path, emphasis: str | None = None) -> None:
     """Picture of mean error against energy with intervals, and the curve of equal return through one policy.
 
-    Policies that differ by a number at the end of their names are joined by a line, and labelled by the number.
+    Policies that differ by a number at the end of their names are joined by a line, and labelled by the number. The
+    floor of all nodes awake is drawn as the mean error of a round Gaussian of its RMS (sqrt(pi) / 2 of it).
 
     Args:
         path: a PNG file.
@@ -108,6 +133,11 @@ def draw_front(evaluation: Evaluation, lam: float, path: str | Path, emphasis: s
     for stem in {_stem(policy) for policy in points} - set(points):
         family = sorted((points[policy][0].mean, points[policy][1].mean) for policy in points if _stem(policy) == stem)
         axes.plot(*zip(*family), color=FAMILY, linewidth=1, label=f"{stem}0, 1, ...", zorder=1)
+    floor = evaluation.floor_m()
+    if floor is not None:
+        kind = {"bound": "floor", "reference": "reference"}[bound_kind(evaluation.scenario)]
+        label = f"{kind}: all nodes, {floor:.3g} m RMS"
+        axes.axhline(ROUND * floor, color=FLOOR, linewidth=1, linestyle=":", label=label)
     axes.set_xscale("log")
     if emphasis is not None:
         energy, error = points[emphasis]

@@ -11,6 +11,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from wsn_env import draws
+from wsn_env.bounds import Bound, bound_kind
 from wsn_env.interface import Interface, Settings
 from wsn_env.interface.info import measures
 from wsn_env.interface.render import check_render_mode, frame
@@ -72,6 +73,9 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self._squares = np.zeros(num_envs)
         self._detections = np.zeros(num_envs, dtype=np.int64)
         self._ended = np.zeros(num_envs, dtype=bool)
+        self._bound = None
+        if bound_kind(self.scenario) != "none":
+            self._bound = Bound(self.scenario, self.num_envs, self.world.threads)
 
     def reset(self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None):
         """New episodes, in the rows of options["reset_mask"] only where it is given.
@@ -91,8 +95,8 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
                 self._generators[i] = seeding.np_random(seeds[i])[0]
         if self._state is None:
             self._state = self.world.allocate(self.num_envs)
-        outcome = self._restart(rows)
-        return self._observe(rows), _masked(self._reward_and_info(outcome)[1], rows)
+        info = self._restart(rows)
+        return self._observe(rows), _masked(info, rows)
 
     def _rows_to_reset(self, options) -> np.ndarray:
         mask = (options or {}).get("reset_mask")
@@ -106,7 +110,8 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             )
         return mask
 
-    def _restart(self, rows: np.ndarray):
+    def _restart(self, rows: np.ndarray) -> dict[str, np.ndarray]:
+        """Begin episodes in some rows; gives the info, which is theirs alone."""
         keys = np.zeros(self.num_envs, np.uint64)
         for i in np.flatnonzero(rows):
             keys[i] = draws.episode_key(self._generators[i])
@@ -114,7 +119,10 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self._squares[rows] = 0.0
         self._detections[rows] = 0
         self._ended = self._ended & ~rows
-        return outcome
+        info = self._reward_and_info(outcome)[1]
+        if self._bound is not None:
+            info["bound_m"] = self._bound.begin(self._state, rows)
+        return info
 
     def step(self, actions):
         """One period for every row; ended rows start anew as the autoreset mode says."""
@@ -131,10 +139,11 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         reward, info = self._reward_and_info(outcome)
         self._squares += outcome.error_m * outcome.error_m
         self._detections += outcome.detections
+        if self._bound is not None:
+            info["bound_m"] = self._bound.advance(self._state, outcome)
         if begins:  # next-step mode: these rows only begin
             reward[anew] = 0.0
-            first = self._restart(anew)
-            _overwrite(info, self._reward_and_info(first)[1], anew)
+            _overwrite(info, self._restart(anew), anew)
         truncated = self._state.period >= self.scenario.periods
         terminated = np.zeros(self.num_envs, dtype=bool)
         ends = truncated.any()
@@ -143,12 +152,18 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self._ended = truncated.copy()
         infos = _masked(info)
         if ends:
-            infos |= _masked(self._episode_info(), truncated)
+            infos |= _masked(self._episode_info(truncated), truncated)
         return self._observe(), reward, terminated, truncated, infos
 
-    def _episode_info(self) -> dict[str, np.ndarray]:
+    def _episode_info(self, rows: np.ndarray) -> dict[str, np.ndarray]:
+        """What sums up an episode, of the rows that end."""
         periods = self.scenario.periods
-        return {"episode_rms_m": np.sqrt(self._squares / periods), "antnp": self._detections / periods}
+        info = {"episode_rms_m": np.sqrt(self._squares / periods), "antnp": self._detections / periods}
+        if self._bound is not None:
+            info["episode_bound_m"] = self._bound.episode_m()
+            if self._bound.kind == "bound":
+                info["episode_floor_m"] = self._bound.floor_m(self._state, rows)
+        return info
 
     def _same_step(self, reward, terminated, truncated, info):
         """Begin the ended rows within the step; their last observation and info go to final_obs and final_info."""
@@ -157,10 +172,9 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         for i in np.flatnonzero(truncated):
             final[i] = {name: value[i] for name, value in last.items()} if isinstance(last, dict) else last[i]
         infos = {"final_obs": final, "_final_obs": truncated.copy()}
-        infos["final_info"] = _masked(info | self._episode_info(), truncated)
+        infos["final_info"] = _masked(info | self._episode_info(truncated), truncated)
         infos["_final_info"] = truncated.copy()
-        first = self._restart(truncated)
-        _overwrite(info, self._reward_and_info(first)[1], truncated)
+        _overwrite(info, self._restart(truncated), truncated)
         infos |= _masked(info)
         return self._observe(truncated), reward, terminated, truncated, infos
 

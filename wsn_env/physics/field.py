@@ -89,6 +89,14 @@ def _along(offset, place):
 
 
 @lean_piece
+def cells_within(place, x, y, reach_m):
+    """First and last line, first and last column of the cells that hold every node nearer than this to (x, y)."""
+    x, y = x - place.x_m, y - place.y_m
+    lines = _along(y - reach_m, place), _along(y + reach_m, place)
+    return lines[0], lines[1], _along(x - reach_m, place), _along(x + reach_m, place)
+
+
+@lean_piece
 def nearest_living(positions, battery, x, y):
     """The living node nearest to (x, y); the lower index wins a tie; -1: none is alive. Looks at all of them."""
     best, shortest = -1, np.inf

@@ -128,6 +128,13 @@ def predict_moments(mean, cov, t, q, predicted_mean, predicted_cov):
     """
     for i in range(4):
         predicted_mean[i] = mean[i] + (t * mean[i + 1] if i % 2 == 0 else 0.0)
+    predict_covariance(cov, t, q, predicted_cov)
+
+
+@lean_piece
+def predict_covariance(cov, t, q, predicted_cov):
+    """F P F' + q^2 G G'; also in place, since every entry is made of itself and of later ones."""
+    for i in range(4):
         for j in range(4):
             p = cov[i, j]
             if i % 2 == 0:

@@ -84,10 +84,24 @@ def joint_detection_probability(probabilities):
 @lean_piece
 def detects(key, period, node, squared, c):
     """Whether a node, if awake, detects the target at a squared distance [m^2] in this period."""
+    return detects_by(detection_stream(key, period, c), node, squared, c)
+
+
+@lean_piece
+def detection_stream(key, period, c):
+    """The draws that decide who detects in a period."""
+    return draws.stream(key, period, draws.MEASUREMENT if c.detection == THRESHOLD else draws.DETECTION)
+
+
+@lean_piece
+def detects_by(stream, node, squared, c):
+    """`detects`, where one stream serves many nodes."""
     if c.detection == THRESHOLD:
-        return measured_strength(key, period, node, squared, c) > c.threshold_db
-    p = detection_piece(np.sqrt(squared), c)
-    return p > 0.0 and draws.uniform(draws.stream(key, period, draws.DETECTION), node) < p
+        return _noisy_strength(stream, node, squared, c) > c.threshold_db
+    if squared >= 1.000001 * c.reach_m * c.reach_m:
+        return False
+    luck = draws.uniform(stream, node)
+    return luck < c.ceiling and luck < detection_piece(np.sqrt(squared), c)  # many draws need no eqs. 2-3
 
 
 @lean_piece
@@ -168,7 +182,12 @@ def _over_offsets(points, nodes, measurement: Measurement):
 @lean_piece
 def measured_strength(key, period, node, squared, c):
     """The strength that a node measures at a squared distance [m^2] (eq. 1), in dB or in power."""
-    noise, _ = draws.normal_pair(draws.stream(key, period, draws.MEASUREMENT), node)
+    return _noisy_strength(draws.stream(key, period, draws.MEASUREMENT), node, squared, c)
+
+
+@lean_piece
+def _noisy_strength(stream, node, squared, c):
+    noise, _ = draws.normal_pair(stream, node)
     return strength(squared, c) + c.noise * noise
 
 
