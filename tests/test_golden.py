@@ -21,11 +21,11 @@ from wsn_env import Scenario, View, World, draws, make_policy
 HERE = Path(__file__).parents[1]
 ROWS = 8
 GOLDEN = {
-    "PreDC-v0": "89cda4d94cb8242a78c2d3d206d12395c2a922889626186845f30d32bd846238",
-    "Rssi-v0": "082090700aad4cf0768f2f3a23bb2ffbec805c8f4f955fdf251c4de899c23340",
-    "Binary-v0": "d976cca4fb2be74a2fcf604a417108a34179e5b3af0fae76a7f1c8464b1192bf",
-    "Anchors-v0": "6690603479c1d21d13b284b9c84b6529fd53c9cf7d720759c58810b4ed8c9c45",
-    "Underwater-v0": "fed9f5deb99895b6707634ef6b6ceec464b766b653d0fc65ed272d638c2faa75",
+    "PreDC-v0": "101b9c7b6e0b8642c9f02c84c639d8e7eb46fd6be34e8fb9cece635bdd089d53",
+    "Rssi-v0": "b77bcec67de8607f70ce66fe150ec92c914cda28c69541a879394241653935e0",
+    "Binary-v0": "8ff3bdbc39ee141a24589ae425aba44692cbbf0809172ab651b870032cd6cfc7",
+    "Anchors-v0": "8a2fcb1095420ec1049f78a6295032574074ae0e13421e4ed91b6771ac20d9f2",
+    "Underwater-v0": "899ccca96bd33e93f057cfe9653cb8b15779db3b70715386a51cd66d555740ba",
 }
 
 

@@ -12,8 +12,9 @@ import hashlib
 import json
 import platform
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -55,28 +56,51 @@ class Summary:
         values = np.asarray(values, dtype=float)
         if len(values) < 2 or np.ptp(values) == 0:
             return cls(float(values.mean()), float(values.min()), float(values.max()))
-        return cls(float(values.mean()), *_interval(np.mean, values))
+        return cls(float(values.mean()), *_middle(resampled_means(values)))
 
     @classmethod
     def of_root_ratio(cls, values, references) -> Summary:
         """sqrt(mean(values) / mean(references)) of pairs, the interval as in `of`."""
-        ratio = _root_ratio(values, references)
+        ratio = float(np.sqrt(np.mean(values) / np.mean(references)))
         if len(values) < 2:
-            return cls(float(ratio), float(ratio), float(ratio))
-        return cls(float(ratio), *_interval(_root_ratio, values, references))
+            return cls(ratio, ratio, ratio)
+        means = resampled_means(np.stack([values, references], axis=1))
+        return cls(ratio, *_middle(np.sqrt(means[:, 0] / means[:, 1])))
 
 
-def _interval(statistic, *paired) -> tuple[float, float]:
-    from scipy.stats import bootstrap
-
-    rng = np.random.default_rng(0)
-    settings = dict(n_resamples=RESAMPLES, method="percentile", paired=len(paired) > 1, rng=rng)
-    interval = bootstrap(paired, statistic, **settings).confidence_interval
-    return float(interval.low), float(interval.high)
+def _middle(resampled) -> tuple[float, float]:
+    low, high = np.percentile(resampled, [2.5, 97.5])
+    return float(low), float(high)
 
 
-def _root_ratio(values, references, axis=-1):
-    return np.sqrt(np.mean(values, axis=axis) / np.mean(references, axis=axis))
+def resampled_means(values) -> np.ndarray:
+    """Means over RESAMPLES bootstrap samples of the episodes, the same for all quantities of so many episodes.
+
+    Args:
+        values: (episodes, ...).
+
+    Returns: (RESAMPLES, ...).
+    """
+    flat = np.asarray(values, float).reshape(len(values), -1)
+    means = np.concatenate([shares @ flat for shares in _shares(len(values))])
+    return means.reshape(RESAMPLES, *np.shape(values)[1:])
+
+
+def _shares(episodes: int) -> Iterable[np.ndarray]:
+    """How often each episode is in each sample, over their number, some samples at a time; kept if not too many."""
+    return _kept_shares(episodes) if episodes <= 2 * BLOCK**2 else _draw_shares(episodes)
+
+
+@lru_cache(maxsize=4)
+def _kept_shares(episodes: int) -> list[np.ndarray]:
+    return list(_draw_shares(episodes))
+
+
+def _draw_shares(episodes: int) -> Iterator[np.ndarray]:
+    rng, at_once = np.random.default_rng(0), 100
+    for _ in range(RESAMPLES // at_once):
+        drawn = rng.integers(episodes, size=(at_once, episodes)) + episodes * np.arange(at_once)[:, None]
+        yield np.bincount(drawn.ravel(), minlength=at_once * episodes).reshape(at_once, episodes) / episodes
 
 
 @dataclass(frozen=True)
@@ -90,9 +114,16 @@ class Evaluation:
     seed: int
     rows: list[dict]
 
+    @cached_property
+    def _rows_of(self) -> dict[tuple[str, float], list[dict]]:
+        found: dict[tuple[str, float], list[dict]] = {}
+        for row in self.rows:
+            found.setdefault((row["policy"], row["lam"]), []).append(row)
+        return found
+
     def values(self, policy: str, lam: float, column: str) -> np.ndarray:
         """(episodes,) in the order of the seeds, so that two policies' values are pairs."""
-        return np.array([row[column] for row in self.rows if row["policy"] == policy and row["lam"] == lam])
+        return np.array([row[column] for row in self._rows_of[policy, lam]])
 
     def summary(self, policy: str, lam: float) -> dict[str, Summary]:
         """Means with intervals of the quantities in MEANS."""
