@@ -119,7 +119,7 @@ def run_reproduce(command: Reproduce) -> None:
 def run_compile(command: Compile) -> None:
     """`wsn compile`: play a little of everything."""
     from wsn_env.env import ClusterEnv
-    from wsn_env.evaluation import episodes
+    from wsn_env.evaluation import episodes, rollout
     from wsn_env.policies import make_policy
     from wsn_env.view import View
     from wsn_env.world import World
@@ -129,8 +129,7 @@ def run_compile(command: Compile) -> None:
         for order in ("nearest", "information"):
             env = ClusterEnv(particles=20, periods=3, start="search", order=order, fast=fast)
             env.reset(seed=0)
-            for _ in range(3):
-                env.step(10)
+            env.step(10)
     scenarios = [Scenario.named("PreDC-v0", tracker=tracker) for tracker in ("particle", "snapshot", "ickf")]
     scenarios.append(Scenario.named("Binary-v0", nodes=20, tracker="boundary"))
     for tracker in ("grnn", "nonlinear_ls"):
@@ -139,6 +138,7 @@ def run_compile(command: Compile) -> None:
         for policy in ("pre_dc", "random"):
             for state, _ in episodes(make_policy(policy, scenario), World(scenario), [0]):
                 View.from_arrays(View.of(state).as_arrays())
+    rollout(make_policy("nearest2", scenario), World(scenario), [0])  # with its bound
     print(f"compiled in {time.perf_counter() - started:.0f} s")
 
 
