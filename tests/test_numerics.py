@@ -218,3 +218,15 @@ def test_its_logarithm_in_float32_is_scipys(mode, uniform):
         assert (got <= 0).all()
     far = log_normal_cdf32(np.array([-np.inf, -3e38, 3e38, np.inf], np.float32))
     assert (far[:2] < -1e29).all() and np.isfinite(far).all() and (far[2:] == 0).all()
+
+
+def test_expected_error_is_the_mean_length_of_a_normal_vector():
+    from scipy.special import ellipe
+
+    from wsn_env.numerics import expected_error
+
+    for minor in np.linspace(0, 1, 21):
+        exact = np.sqrt(2 / np.pi) * ellipe(1 - minor**2)
+        turned = np.array([[0.8, -0.6], [0.6, 0.8]])
+        cov = 9.0 * turned @ np.diag([1.0, minor**2]) @ turned.T
+        assert expected_error(cov[0, 0], cov[0, 1], cov[1, 1]) == pytest.approx(3 * exact, rel=2e-3)
