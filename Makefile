@@ -1,8 +1,7 @@
 # `make train` trains a scheduler and compares it, `make test` runs the tests; both set up .venv first.
 PYTHON ?= python3
 SCENARIO ?= PreDC-v0
-ORDER ?= nearest
-# Left out: the scenario's.
+# Left out: every trade-off of the scenario.
 LAM ?=
 # An index of CPU wheels of torch, where the default index would bring a CUDA build: TORCH_INDEX="--index-url URL"
 TORCH_INDEX ?=
@@ -11,10 +10,18 @@ VENV := .venv
 RUN := $(VENV)/bin/python
 READY := $(VENV)/.ready
 
-.PHONY: train test slow bench bench-short lint clean
+.PHONY: train pretrained test slow bench bench-short lint clean
 
 train: $(READY)
-	$(RUN) train.py --resume --scenario $(SCENARIO) --order $(ORDER) $(if $(LAM),--lam $(LAM))
+	$(RUN) train.py --resume --scenario $(SCENARIO) $(if $(LAM),--lam $(LAM))
+
+# The policies that come with the package, trained again; half an hour.
+pretrained: $(READY)
+	for scenario in PreDC-v0 Rssi-v0; do \
+		$(RUN) train.py --resume --runs out/pretrained --scenario $$scenario --episodes 0 && \
+		cp out/pretrained/$$scenario/policy.json out/pretrained/$$scenario/policy.safetensors agents/pretrained/$$scenario/ \
+		|| exit 1; \
+	done
 
 test: $(READY)
 	$(RUN) -m pytest

@@ -54,9 +54,9 @@ class Training:
     """CSV files of recorded motion (columns t, x, y in s and m), to train and compare on instead of the scenario's."""
     set: list[str] = field(default_factory=list)
     """Scenario quantities, as name=value: nodes=400 particles=1000."""
-    vary: list[str] = field(default_factory=list)
+    vary: list[str] | None = None
     """Further scenarios to train in, each this one with some quantities changed: nodes=81 motion=turns,particles=1000.
-    The rows are dealt evenly among all."""
+    The rows are dealt evenly among all. Left out: a third and four times as many nodes, where they are drawn."""
     action: str = "menu"
     """What it chooses from: menu | subset."""
     order: str | None = None
@@ -86,7 +86,7 @@ class Training:
     """Passes over a rollout."""
     learning_rate: float = 2e-3
     """At the start; falls linearly to 0."""
-    gamma: float = 0.9
+    gamma: float = 0.95
     """Discount per period."""
     gae_lambda: float = 0.9
     """Of the generalised advantage estimate."""
@@ -180,7 +180,17 @@ def complete(settings: Training) -> Scenario:
         raise ValueError(f"train.py: lam = {settings.lam}: must be one number, or two that it is drawn between")
     if settings.order is None:
         settings.order = "value" if scenario.binary else "nearest" if scenario.locates else "information"
+    if settings.vary is None:
+        settings.vary = [f"nodes={nodes}" for nodes in other_densities(scenario)]
     return scenario.override(lam=settings.lam[0] if len(settings.lam) == 1 else tuple(settings.lam))
+
+
+def other_densities(scenario: Scenario) -> list[int]:
+    """Numbers of nodes: 81 and 1000 for the 225 of PreDC-v0; none where every node has its place."""
+    if scenario.field.positions is not None:
+        return []
+    wanted = [scenario.field.nodes * share for share in (0.36, 40 / 9)]
+    return [round(n**0.5) ** 2 if scenario.field.layout == "grid" else round(n) for n in wanted]
 
 
 def make_envs(settings: Training, scenario: Scenario, speaks: Settings) -> SB3Fleet:
@@ -208,7 +218,7 @@ def check(settings: Training) -> None:
         if getattr(settings, name) not in allowed:
             raise ValueError(f"train.py: {name} = {getattr(settings, name)!r}: must be one of {', '.join(allowed)}")
     if settings.rows <= len(settings.vary):
-        raise ValueError(f"train.py: rows = {settings.rows}: must be at least {1 + len(settings.vary)}, one a scenario")
+        raise ValueError(f"train.py: rows = {settings.rows}: must be above {len(settings.vary)}, one a scenario")
     # Every seed that training may use lies below those of evaluations.
     most = FIRST_SEED - settings.steps - settings.rows
     check_quantity("train.py", "seed", settings.seed, at_least=0, at_most=most, whole=True)
