@@ -56,7 +56,7 @@ class Training:
     """Scenario quantities, as name=value: nodes=400 particles=1000."""
     vary: list[str] | None = None
     """Further scenarios to train in, each this one with some quantities changed: nodes=81 motion=turns,particles=1000.
-    The rows are dealt evenly among all. Left out: a third and four times as many nodes, where they are drawn."""
+    The rows are dealt evenly among all. Left out: two thirds and twice as many nodes, where they are drawn."""
     action: str = "menu"
     """What it chooses from: menu | subset."""
     order: str | None = None
@@ -186,10 +186,10 @@ def complete(settings: Training) -> Scenario:
 
 
 def other_densities(scenario: Scenario) -> list[int]:
-    """Numbers of nodes: 81 and 1000 for the 225 of PreDC-v0; none where every node has its place."""
+    """Numbers of nodes: 150 and 450 for the 225 of PreDC-v0; none where every node has its place."""
     if scenario.field.positions is not None:
         return []
-    wanted = [scenario.field.nodes * share for share in (0.36, 40 / 9)]
+    wanted = [scenario.field.nodes * share for share in (2 / 3, 2)]
     return [round(n**0.5) ** 2 if scenario.field.layout == "grid" else round(n) for n in wanted]
 
 
