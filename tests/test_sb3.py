@@ -9,7 +9,7 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import DummyVecEnv, VecFrameStack
 
 from agents.base import ViewPolicy
-from agents.sb3 import SB3VecEnv
+from agents.sb3 import SB3Fleet, SB3VecEnv
 from tests.test_env import same
 from wsn_env import Cluster, ClusterEnv, ClusterVectorEnv, Scenario, make_policy
 from wsn_env.evaluation import evaluate
@@ -118,3 +118,49 @@ def test_predict_keeps_the_head_where_a_policy_says_so():
         order = np.hypot(*(observation["positions"] - observation["predicted_mean"][::2]).T).argsort()
         assert action["head"] == (order[0] if nearest_first else observation["head"])
         observation, *_ = env.step({"head": order[5], "members": np.zeros(30, int)})
+
+
+def test_a_fleet_is_its_parts_one_after_the_other():
+    def parts():
+        scenarios = [dict(SMALL, nodes=20), SMALL]
+        settings = dict(autoreset_mode="Disabled", lam=(0.5, 8.0))
+        return [SB3VecEnv(ClusterVectorEnv(3 + i, **settings, **one)) for i, one in enumerate(scenarios)]
+
+    fleet, alone = SB3Fleet(parts()), parts()
+    fleet.seed(5)
+    alone[0].seed(5), alone[1].seed(5 + 3)
+    assert same(fleet.reset(), np.concatenate([part.reset() for part in alone]))
+    rng = np.random.default_rng(0)
+    for _ in range(30):
+        actions = rng.integers(0, 28, 7)
+        observation, reward, done, infos = fleet.step(actions)
+        theirs = alone[0].step(actions[:3]), alone[1].step(actions[3:])
+        for i, ours in enumerate((observation, reward, done)):
+            assert same(ours, np.concatenate([their[i] for their in theirs]))
+        assert all(map(same, infos, theirs[0][3] + theirs[1][3]))
+    masks = np.array(fleet.env_method("action_masks"))
+    assert masks.shape == (7, 28) and fleet.has_attr("action_masks")
+    assert fleet.get_attr("lam", indices=[6])[0].shape == (4,)
+    with pytest.raises(ValueError, match="spaces differ"):
+        SB3Fleet([*parts(), SB3VecEnv(ClusterVectorEnv(2, action="subset", autoreset_mode="Disabled", **SMALL))])
+
+
+def test_calibrated_rewards_cost_what_the_true_errors_do():
+    settings = dict(autoreset_mode="Disabled", reward="belief", lam=2.0, **SMALL)
+    plain, calibrated = (SB3VecEnv(ClusterVectorEnv(64, **settings), calibrated=one) for one in (False, True))
+    for envs in (plain, calibrated):
+        envs.seed(0)
+        envs.reset()
+    rng, believed, given, true = np.random.default_rng(0), 0.0, 0.0, 0.0
+    for period in range(39):
+        actions = rng.integers(0, 28, 64)
+        before, after = plain.step(actions)[1], calibrated.step(actions)[1]
+        if period >= 13:  # the ratio has settled
+            believed -= before.sum()
+            given -= after.sum()
+    sums = calibrated._errors
+    true = sums[0] / sums[1]
+    assert abs(true - 1) > 0.02  # else the test says nothing
+    assert np.sign(given - believed) == np.sign(true - 1)
+    with pytest.raises(ValueError, match="Disabled"):
+        SB3VecEnv(ClusterVectorEnv(2, autoreset_mode="SameStep", **SMALL), calibrated=True)
