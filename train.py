@@ -165,7 +165,8 @@ def train(settings: Training) -> None:
             f"{(time.process_time() - busy) / seconds:.1f} cores busy"
         )
 
-    facts = {"training": plain(settings), "scenario": scenario.as_dict(), "versions": versions()}
+    made = {name: value for name, value in plain(settings).items() if name not in ("name", "runs", "resume")}
+    facts = {"training": made, "scenario": scenario.as_dict(), "versions": versions()}
     policy = save_policy(folder, network_of(model), speaks, facts)
     print(f"saved: {policy}")
     if settings.episodes:

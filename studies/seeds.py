@@ -1,0 +1,153 @@
+"""Several trainings of one scheduler against every rule, at every trade-off: the tables of docs/learning.md.
+
+    python -m studies.seeds --scenario Rssi-v0 --policies runs/a runs/b runs/c --out out/seeds
+
+PPO's return is the mean over the trainings, episode by episode; intervals are bootstraps over the episodes that all
+share. The best of a numbered family is chosen in hindsight, at each lam by the very episodes it is compared on.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import tyro
+
+from agents.ppo import PPOPolicy
+from wsn_env.cli import make_scenario
+from wsn_env.evaluation import Evaluation, Summary, evaluate, forget_blocks
+from wsn_env.files import replacing
+from wsn_env.front import hypervolume, numbered, reference_point
+from wsn_env.policies import make_policy, policy_names
+from wsn_env.progress import progress_bar
+
+SLOW = ("ppo", "planner", "all")
+
+
+@dataclass
+class Comparison:
+    """Compare trainings with rules."""
+
+    policies: list[Path]
+    """Folders of trained policies, or their policy.json."""
+    scenario: str = "PreDC-v0"
+    """Scenario id."""
+    set: list[str] = field(default_factory=list)
+    """Scenario quantities, as name=value."""
+    lam: list[float] = field(default_factory=list)
+    """Trade-offs [m/mJ]; left out: the scenario's octaves."""
+    rules: list[str] = field(default_factory=list)
+    """Hand-written policies; left out: all but slow ones."""
+    episodes: int = 1000
+    """Held-out episodes."""
+    seed: int = 0
+    """Which."""
+    out: Path = Path("out/seeds")
+    """Folder for evaluation.csv and seeds.md; a second call continues."""
+
+
+def main() -> int:
+    """Run."""
+    asked = tyro.cli(Comparison, description=__doc__)
+    scenario = make_scenario(asked.scenario, asked.set, [])
+    trained = {}
+    for i, path in enumerate(asked.policies):
+        path = path / "policy.json" if path.is_dir() else path
+        trained[f"ppo{i}"] = PPOPolicy(scenario, path=str(path))
+    rules = asked.rules or [name for name in policy_names() if name not in SLOW]
+    policies = trained | {name: make_policy(name, scenario) for name in rules}
+    lams = asked.lam or scenario.lam_octaves
+    with progress_bar() as report:
+        evaluation = evaluate(policies, scenario, lams, asked.episodes, asked.seed, keep=asked.out, progress=report)
+    evaluation.save(asked.out)
+    text = "\n".join(
+        [table(evaluation, list(trained)), bounds(evaluation, list(trained)), volumes(evaluation, trained)]
+    )
+    with replacing(asked.out / "seeds.md") as path:
+        path.write_text(text)
+    forget_blocks(asked.out)
+    print(text)
+    return 0
+
+
+def returns(evaluation: Evaluation, trained: list[str], lam: float) -> np.ndarray:
+    """(trainings, episodes)."""
+    return np.array([evaluation.values(name, lam, "return") for name in trained])
+
+
+def families(evaluation: Evaluation, trained: list[str]) -> dict[str, list[str]]:
+    """Rules by their stems: nearest0..8 is one family, pre_dc another."""
+    found: dict[str, list[str]] = {}
+    for name in evaluation.policies:
+        if name not in trained:
+            found.setdefault(numbered(name)[0], []).append(name)
+    return found
+
+
+def table(evaluation: Evaluation, trained: list[str]) -> str:
+    """Returns at each lam; for each rule, or the best of its family, what PPO has over it, in percent of it."""
+    lams = evaluation.lams
+    lines = ["| policy | " + " | ".join(f"{lam:g}" for lam in lams) + " |", "|---" + "|--:" * len(lams) + "|"]
+    cells = []
+    for lam in lams:
+        own = returns(evaluation, trained, lam)
+        over_seeds = own.mean(axis=1)
+        cells.append(f"**{own.mean():.1f}** ({over_seeds.min():.1f} to {over_seeds.max():.1f})")
+    lines.append("| **PPO**, one policy | " + " | ".join(cells) + " |")
+    for stem, names in families(evaluation, trained).items():
+        cells = []
+        for lam in lams:
+            best = max(names, key=lambda name: evaluation.values(name, lam, "return").mean())
+            theirs = evaluation.values(best, lam, "return")
+            ahead = Summary.of(returns(evaluation, trained, lam).mean(axis=0) - theirs)
+            share = 100 / abs(theirs.mean())
+            which = f"{numbered(best)[1]}: " if len(names) > 1 else ""
+            cells.append(
+                f"{which}{theirs.mean():.1f} ({share * ahead.mean:+.1f} [{share * ahead.low:+.1f},"
+                f" {share * ahead.high:+.1f}] %)"
+            )
+        label = f"best of {stem}0..{numbered(names[-1])[1]}" if len(names) > 1 else stem
+        lines.append(f"| {label} | " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def bounds(evaluation: Evaluation, trained: list[str]) -> str:
+    """RMS over the bound at the middle lam."""
+    lam = evaluation.lams[len(evaluation.lams) // 2]
+    lines = [f"RMS error over the bound of its own schedule, lam = {lam:g}:", ""]
+    for name in evaluation.policies:
+        ratio = evaluation.rms_over_bound(name, lam)
+        if ratio is not None:
+            lines.append(f"- {name}: {ratio.mean:.3f} [{ratio.low:.3f}, {ratio.high:.3f}]")
+    return "\n".join(lines) + "\n"
+
+
+def volumes(evaluation: Evaluation, trained) -> str:
+    """Hypervolume of each training's front, and of the union of all rules'; and the difference, over the episodes."""
+    reference = reference_point(evaluation.scenario)
+
+    def points(names):
+        columns = [
+            [evaluation.values(n, lam, c) for c in ("error_m", "energy_mj")] for n in names for lam in evaluation.lams
+        ]
+        return np.unique(np.array(columns), axis=0).transpose(2, 0, 1)  # (episodes, points, 2)
+
+    rules = points([name for name in evaluation.policies if name not in trained])
+    rng, lines = np.random.default_rng(0), []
+    picks = [rng.integers(evaluation.episodes, size=evaluation.episodes) for _ in range(500)]
+    theirs = np.array([hypervolume(rules[pick].mean(axis=0), reference) for pick in picks])
+    whole = hypervolume(rules.mean(axis=0), reference)
+    lines.append(f"Hypervolume up to {reference[0]:g} m, {reference[1]:g} mJ: all rules together {whole:.4f}")
+    for name in trained:
+        own = points([name])
+        mine = np.array([hypervolume(own[pick].mean(axis=0), reference) for pick in picks])
+        value = hypervolume(own.mean(axis=0), reference)
+        low, high = np.percentile(mine - theirs, [2.5, 97.5])
+        lines.append(f"- {name}: {value:.4f}; {value - whole:+.4f} [{low:+.4f}, {high:+.4f}]")
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

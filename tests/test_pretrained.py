@@ -1,0 +1,46 @@
+"""The policies that come with the package give what docs/learning.md says."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from agents.ppo import PRETRAINED
+from wsn_env import Scenario, make_policy
+from wsn_env.evaluation import evaluate
+
+DOCS = Path(__file__).parents[1] / "docs" / "learning.md"
+EPISODES = 150  # the first of the documented thousand
+SHIPPED = sorted(path.parent.name for path in PRETRAINED.glob("*/policy.json"))
+
+
+def documented(name: str, lam: float) -> float:
+    """The return in the table of shipped policies: a line for each scenario, a column for each lam."""
+    table = re.search(r"<!-- shipped -->\n(.*?)\n\n", DOCS.read_text(), re.S)[1].splitlines()
+    columns = [cell.strip() for cell in table[0].split("|")]
+    row = next(line for line in table if line.startswith(f"| {name} "))
+    return float(row.split("|")[columns.index(f"{lam:g}")])
+
+
+def test_there_are_some():
+    assert SHIPPED == ["PreDC-v0", "Rssi-v0"]
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_files_are_small_and_tell_how_they_were_made(name):
+    for file in (PRETRAINED / name).iterdir():
+        assert file.stat().st_size < 300_000
+    saved = json.loads((PRETRAINED / name / "policy.json").read_text())
+    assert saved["training"]["seed"] == 0 and saved["training"]["scenario"] == name
+    assert saved["training"]["steps"] <= 3_000_000
+
+
+@pytest.mark.parametrize("lam", [1.0, 4.0, 16.0])
+@pytest.mark.parametrize("name", SHIPPED)
+def test_returns_are_the_documented_ones(name, lam):
+    scenario = Scenario.named(name)
+    evaluation = evaluate({"ppo": make_policy("ppo", scenario)}, scenario, [lam], EPISODES)
+    values = evaluation.values("ppo", lam, "return")
+    se = values.std() / EPISODES**0.5
+    assert abs(values.mean() - documented(name, lam)) < 3 * se
