@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from wsn_env.evaluation import Evaluation
+from wsn_env.evaluation import Evaluation, stem_of
 from wsn_env.files import replacing
 
 EMPHASIS, FAMILY, OTHER = "#D55E00", "#0072B2", "#333333"
@@ -38,6 +38,12 @@ def _interval(value, digits: int, sign: str = "") -> str:
     return f"{value.mean:{sign}.{digits}f} [{value.low:{sign}.{digits}f}, {value.high:{sign}.{digits}f}]"
 
 
+def best_in_hindsight(evaluation: Evaluation, lam: float) -> list[str]:
+    """A line on the best member of each numbered family, if there is one."""
+    best = [f"{evaluation.best_of(stem, lam)} of {stem}0, 1, ..." for stem in evaluation.families()]
+    return [f"best in hindsight: {', '.join(best)}"] if best else []
+
+
 def wide_console():
     """For the terminal, or as wide as a table wants where the output is a file or a pipe."""
     from rich.console import Console
@@ -54,9 +60,8 @@ def print_tables(evaluation: Evaluation, reference: str | None = None, console=N
     console = console or wide_console()
     for lam in evaluation.lams:
         title = f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes"
-        table = Table(
-            title=title, caption=f"means, 95 % bootstrap intervals; {reference} minus it: paired difference of returns"
-        )
+        caption = f"means, 95 % bootstrap intervals; {reference} minus it: paired difference of returns"
+        table = Table(title=title, caption="\n".join([caption, *best_in_hindsight(evaluation, lam)]))
         for name in HEADER:
             table.add_column(name.format(reference), justify="left" if name == "policy" else "right")
         for row in table_rows(evaluation, lam, reference):
@@ -78,6 +83,7 @@ def save_markdown(evaluation: Evaluation, folder: str | Path) -> None:
     parts = [
         f"## {evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes\n\n"
         + markdown_table(evaluation, lam, evaluation.policies[0])
+        + "".join(f"\n{line}\n" for line in best_in_hindsight(evaluation, lam))
         for lam in evaluation.lams
     ]
     with replacing(Path(folder) / "evaluation.md") as path:
@@ -104,8 +110,10 @@ def draw_front(evaluation: Evaluation, lam: float, path: str | Path, emphasis: s
         s = evaluation.summary(policy, lam)
         points[policy] = s["energy_mj"], s["error_m"]
         _draw_point(axes, policy, *points[policy], strong=policy == emphasis)
-    for stem in {_stem(policy) for policy in points} - set(points):
-        family = sorted((points[policy][0].mean, points[policy][1].mean) for policy in points if _stem(policy) == stem)
+    for stem in {stem_of(policy) for policy in points} - set(points):
+        family = sorted(
+            (points[policy][0].mean, points[policy][1].mean) for policy in points if stem_of(policy) == stem
+        )
         axes.plot(*zip(*family), color=FAMILY, linewidth=1, label=f"{stem}0, 1, ...", zorder=1)
     axes.set_xscale("log")
     if emphasis is not None:
@@ -126,12 +134,8 @@ def draw_front(evaluation: Evaluation, lam: float, path: str | Path, emphasis: s
     plt.close(figure)
 
 
-def _stem(policy: str) -> str:
-    return policy.rstrip("0123456789")
-
-
 def _draw_point(axes, policy: str, energy, error, strong: bool) -> None:
-    numbered = _stem(policy) != policy
+    numbered = stem_of(policy) != policy
     colour = EMPHASIS if strong else FAMILY if numbered else OTHER
     axes.errorbar(
         energy.mean,
@@ -143,6 +147,6 @@ def _draw_point(axes, policy: str, energy, error, strong: bool) -> None:
         color=colour,
         zorder=3 if strong else 2,
     )
-    label = policy.removeprefix(_stem(policy)) if numbered else policy
+    label = policy.removeprefix(stem_of(policy)) if numbered else policy
     place = (-11, -11) if numbered else (7, 5)
     axes.annotate(label, (energy.mean, error.mean), xytext=place, textcoords="offset points", fontsize=9, color=colour)
