@@ -34,6 +34,7 @@ FLOORS = {
     "agents.sb3": 7,  # adapts the vector environment
     "wsn_env.evaluation": 7,
     "wsn_env.reports": 7,
+    "agents.tuning": 8,  # it compares policies
     "wsn_env.papers": 8,
     "benchmarks": 8,
     "benchmarks.training": 10,  # it times train.py

@@ -76,7 +76,7 @@ def _edge(dx, dy, cov, c):
 
 
 @lean_piece
-def _price_mj(detection, positions, node, head, mean, c):
+def price_mj(detection, positions, node, head, mean, c):
     """Expected energy of a node's being awake for the period instead of asleep, and of its report [mJ].
 
     The report goes to the head, or as far as the prediction where the head is still open; to the sink; to the target.
@@ -125,7 +125,7 @@ def order_by_merit(start, stop, cs, positions, heads, beliefs, lams, nodes, orde
                     g, q00, q01, q11 = gain(detections[k], positions[b], nodes[b, k], mean, cov, p00, p01, p11, c)
                     value = np.sqrt(p00 + p11) - np.sqrt(max(p00 + p11 - g, 0.0))
                     if lams[b] > 0.0:
-                        value -= lams[b] * _price_mj(detections[k], positions[b], nodes[b, k], heads[b], mean, c)
+                        value -= lams[b] * price_mj(detections[k], positions[b], nodes[b, k], heads[b], mean, c)
                     if value > most:
                         best, most, after = k, value, (q00, q01, q11)
             if best < 0:
