@@ -13,6 +13,8 @@ from wsn_env.view import View
 class All(ViewPolicy):
     """All living nodes; head: the nearest to the prediction."""
 
+    sees_lam = False
+
     def act(self, view: View) -> Cluster:
         """Wake everybody, for every row."""
         return Cluster.of(view.nearest_living(), view.alive)

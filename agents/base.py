@@ -17,6 +17,7 @@ class ViewPolicy:
     """Base of the policies: final classes add their parameters as fields and `act`."""
 
     scenario: Scenario = Scenario()
+    sees_lam = True  # False, where a class says so: its choices do not depend on view.lam, and one play serves all lams
 
     def act(self, view: View) -> Cluster:
         """Choose the clusters of the next period, for every row."""

@@ -22,6 +22,7 @@ class Boundary(ViewPolicy):
 
     width_m: float = 5.0
     sds: float = 1.0
+    sees_lam = False
 
     def act(self, view: View) -> Cluster:
         """Wake the ring, for every row."""

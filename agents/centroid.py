@@ -20,6 +20,8 @@ class Centroid(ViewPolicy):
     Without a detection the cluster stays; with no cluster yet, the estimate stands for the centroid.
     """
 
+    sees_lam = False
+
     def act(self, view: View) -> Cluster:
         """Follow, for every row."""
         count = view.sees.sum(axis=1)

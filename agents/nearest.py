@@ -1,4 +1,4 @@
-"""A cluster of fixed size about the prediction."""
+"""A cluster of fixed size about the prediction: the nearest nodes, or those that tell most."""
 
 from __future__ import annotations
 
@@ -8,31 +8,83 @@ from functools import partial
 import numpy as np
 
 from agents.base import ViewPolicy
+from agents.tuned import tuned
+from wsn_env.interface.merit import order_by_merit
+from wsn_env.physics.constants import constants
+from wsn_env.quantity import check_quantity, suggest
+from wsn_env.scenario import Scenario
 from wsn_env.types import Cluster
 from wsn_env.view import View
+
+ORDERS = ("nearest", "information")
+CANDIDATES = 12  # nearest living nodes that the information order chooses from
+RADII = 0.8  # hysteresis in sensing radii where none was tuned
 
 
 @dataclass(frozen=True)
 class Nearest(ViewPolicy):
-    """The head and its n nearest further members: the living nodes nearest to the prediction.
+    """The head and the n best further members: the living nodes nearest to the prediction (nearest0 .. nearest8), or
+    first in the greedy order of information (informed0 .. informed8), each next one the best beside those before it.
 
-    The head stays while the prediction is within `hysteresis_m` of it; then the node nearest to the prediction leads.
+    The head stays while the prediction is within `hysteresis_m` of it; then the best node of the order leads.
     """
 
     n: int = 3
-    hysteresis_m: float = 8.0
+    hysteresis_m: float | None = None  # None: tuned for the scenario's name, order and n; else 0.8 sensing radii
+    order: str = "nearest"
+    sees_lam = False
+
+    def __post_init__(self):
+        check_order(self.order)
+        check_quantity("Nearest", "n", self.n, at_least=0, whole=True)
+        check_quantity("Nearest", "hysteresis_m", self.hysteresis_m, at_least=0, optional=True)
+        if self.hysteresis_m is None:
+            table = tuned(self.scenario, self.order) or {}
+            object.__setattr__(self, "hysteresis_m", table.get(str(self.n), usual_hysteresis_m(self.scenario)))
 
     def act(self, view: View) -> Cluster:
-        """Choose by distance, for every row."""
-        nodes = view.nearest(self.n + 1)[0]
-        standing = view.head >= 0
-        distance = np.where(standing, view.distance[view.rows, np.maximum(view.head, 0)], np.inf)
-        head = np.where(standing & (distance <= self.hysteresis_m), view.head, nodes[:, 0])
-        others = nodes != head[:, None]
-        members = np.where(others & (np.cumsum(others, axis=1) <= self.n), nodes, -1)
-        return Cluster(head, members.astype(np.int32))
+        """Choose, for every row."""
+        return surround(view, self.scenario, self.order, self.hysteresis_m, self.n, self.n)
+
+
+def surround(view: View, scenario: Scenario, order: str, hysteresis_m, sizes, most: int) -> Cluster:
+    """A head near the prediction and its further members in an order of merit.
+
+    Args:
+        order: one of ORDERS.
+        hysteresis_m: the head stays while the prediction is within it, a number or (B,) [m].
+        sizes: further members, a number or (B,).
+        most: no size is larger.
+    """
+    standing = view.head >= 0
+    distance = np.where(standing, view.distance[view.rows, np.maximum(view.head, 0)], np.inf)
+    kept = np.where(standing & (distance <= hysteresis_m), view.head, -1)
+    if order == "nearest":
+        nodes = view.nearest(most + 1)[0]
+    else:
+        candidates = view.nearest(max(CANDIDATES, most + 1), scenario.ring_m)[0]
+        nodes, free = np.empty_like(candidates), np.zeros(len(kept))
+        order_by_merit(0, len(kept), constants(scenario), view.positions, kept, view.belief, free, candidates, nodes)
+    head = np.where(kept >= 0, kept, nodes[:, 0])
+    others = (nodes >= 0) & (nodes != head[:, None])
+    members = np.where(others & (np.cumsum(others, axis=1) <= np.reshape(sizes, (-1, 1))), nodes, -1)
+    return Cluster(head, members.astype(np.int32))
+
+
+def check_order(order: str) -> None:
+    """Raise ValueError for an unknown order."""
+    if order not in ORDERS:
+        raise ValueError(f"order {order!r} is unknown: {suggest(order, ORDERS)}")
+
+
+def usual_hysteresis_m(scenario: Scenario) -> float:
+    """Where none was tuned [m]. A target that receives itself needs no head: nothing is saved by staying."""
+    return 0.0 if scenario.radio.receiver == "target" else RADII * scenario.radius_m
 
 
 nearest0, nearest1, nearest2, nearest3, nearest4, nearest5, nearest6, nearest7, nearest8 = (
     partial(Nearest, n=n) for n in range(9)
+)
+informed0, informed1, informed2, informed3, informed4, informed5, informed6, informed7, informed8 = (
+    partial(Nearest, n=n, order="information") for n in range(9)
 )

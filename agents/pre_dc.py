@@ -26,6 +26,7 @@ class PreDC(ViewPolicy):
     theta: float = 0.9  # theta_d: joint detection probability wanted
     keep_theta: float | None = None  # joint probability that keeps a cluster; None: theta; 0: as printed
     phi0_m: float = 2.0  # Phi0: prediction sd from which the cluster is formed anew [m]
+    sees_lam = False
 
     def act(self, view: View) -> Cluster:
         """Keep or form, for every row."""

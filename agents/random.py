@@ -17,6 +17,8 @@ class Random(ViewPolicy):
     """Among the living nodes that can detect at the prediction, each is a member with probability one half and any may
     be the head; the nearest living node leads where none can. Draws on the view's luck, so it is repeatable."""
 
+    sees_lam = False
+
     def act(self, view: View) -> Cluster:
         """Throw the dice, for every row."""
         able = self.detection(view) > 0

@@ -13,6 +13,8 @@ from wsn_env.view import View
 class StaticCluster(ViewPolicy):
     """All living nodes that can detect at the prediction; head: the nearest to it."""
 
+    sees_lam = False
+
     def act(self, view: View) -> Cluster:
         """Wake them, for every row."""
         return Cluster.of(view.nearest_living(), self.detection(view) > 0)

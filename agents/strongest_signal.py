@@ -28,6 +28,7 @@ class StrongestSignal(ViewPolicy):
 
     hysteresis_db: float = 3.0
     hop_m: float | None = None  # None: the modem's; the sensing radius where the radio has no limit
+    sees_lam = False
 
     def act(self, view: View) -> Cluster:
         """Follow, for every row."""

@@ -19,7 +19,7 @@ envs = gym.make_vec("wsn_env/Rssi-v0", num_envs=20, vectorization_mode="vector_e
 envs.reset(seed=0)
 envs.step(envs.action_space.sample())
 for scenario in ("PreDC-v0", "Binary-v0", "Anchors-v0", "Underwater-v0"):
-    policies = ["pre_dc", "random", "centroid", "nearest2", "boundary", "strongest_signal"]
+    policies = "pre_dc random centroid nearest2 boundary strongest_signal greedy adaptive_informed".split()
     main(["evaluate", "--scenario", scenario, "--episodes", "3", "--policies", *policies, "--set", "particles=60"])
 for scenario, trackers in {
     "Binary-v0": ("boundary", "boundary_ekf", "centroid_rls"),

@@ -9,7 +9,7 @@ import pytest
 
 from wsn_env import Scenario, View, make_policy
 from wsn_env.evaluation import BLOCK, COLUMNS, Evaluation, Summary, evaluate, evaluation_seeds
-from wsn_env.reports import draw_front, markdown_table
+from wsn_env.reports import draw_front, markdown_table, print_tables, save_markdown
 
 SCENARIO = Scenario.named("PreDC-v0", particles=60, nodes=40, side_m=50.0, crossing_m=20.0, periods=8)
 
@@ -158,3 +158,51 @@ def test_damaged_blocks_are_played_again(tmp_path):
     for damage in (b"\xff\xfe", b"5", b'["nearest0", 1.0, 0, []]', b'["nearest0", 1.0, 0, 7]'):
         blocks.write_bytes(head.encode() + b"\n" + damage + b"\n")
         assert evaluate(["nearest0"], SCENARIO, [1.0], episodes=4, keep=tmp_path).rows == whole.rows
+
+
+def test_a_policy_blind_to_lam_plays_once_and_its_rows_are_those_of_a_replay(tmp_path, monkeypatch):
+    import wsn_env.evaluation as module
+
+    class Watched:
+        """Says nothing of lam, so that it is played at each."""
+
+        def act(self, view):
+            return make_policy("pre_dc", SCENARIO).act(view)
+
+    lams, rollout, played = [0.3, 1.7, 10.0], module.rollout, []
+    monkeypatch.setattr(module, "rollout", lambda *given: played.append(given[0]) or rollout(*given))
+    policies = {"blind": make_policy("pre_dc", SCENARIO), "seeing": Watched()}
+    whole = evaluate(policies, SCENARIO, lams, episodes=BLOCK + 3, seed=4)
+    assert played.count(policies["blind"]) == 2 and played.count(policies["seeing"]) == 6
+    blind, seeing = ([row | {"policy": ""} for row in whole.rows if row["policy"] == name] for name in policies)
+    assert repr(blind) == repr(seeing)
+
+    def stop(done, total, text):
+        if done == 6:  # within the second lam
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        evaluate(policies, SCENARIO, lams, episodes=BLOCK + 3, seed=4, keep=tmp_path, progress=stop)
+    played.clear()
+    continued = evaluate(policies, SCENARIO, lams, episodes=BLOCK + 3, seed=4, keep=tmp_path)
+    assert continued.rows == whole.rows
+    assert [type(policy).__name__ for policy in played] == ["Watched"] * 4  # two blocks each at two lams
+
+
+def test_the_best_of_a_family_in_hindsight(tmp_path, capsys):
+    names = ["pre_dc", "nearest0", "nearest3", "nearest8", "single7"]
+    policies = {name: make_policy("nearest0" if name == "single7" else name, SCENARIO) for name in names}
+    evaluation = evaluate(policies, SCENARIO, [0.3, 30.0], episodes=20)
+    assert evaluation.families() == ["nearest"]
+    for lam in evaluation.lams:
+        means = {name: evaluation.values(name, lam, "return").mean() for name in names[1:4]}
+        assert evaluation.best_of("nearest", lam) == max(means, key=means.get)
+    assert evaluation.best_of("nearest", 30.0) == "nearest0" != evaluation.best_of("nearest", 0.3)
+    with pytest.raises(ValueError, match="'neares' has no members: did you mean nearest"):
+        evaluation.best_of("neares", 30.0)
+    with pytest.raises(ValueError, match="must be one of 0.3, 30"):
+        evaluation.best_of("nearest", 4.0)
+    print_tables(evaluation)
+    assert "best in hindsight: nearest0 of nearest0, 1, ..." in capsys.readouterr().out
+    save_markdown(evaluation, tmp_path)
+    assert (tmp_path / "evaluation.md").read_text().count("best in hindsight") == 2

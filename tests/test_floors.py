@@ -37,6 +37,7 @@ FLOORS = {
     "wsn_env.reports": 7,
     "wsn_env.front": 7,
     "wsn_env.front_report": 7,
+    "agents.tuning": 8,  # it compares policies
     "wsn_env.papers": 8,
     "benchmarks": 8,
     "benchmarks.training": 10,  # it times train.py

@@ -13,6 +13,7 @@ from wsn_env.interface import Interface, Settings
 from wsn_env.sections import BOUNDARY_TRACKERS
 
 HAND_WRITTEN = "all boundary centroid nearest0 nearest3 pre_dc random static_cluster strongest_signal".split()
+HAND_WRITTEN += "adaptive adaptive_informed greedy informed2".split()
 SEEDS = st.integers(0, 2**32 - 1)
 
 

@@ -7,6 +7,7 @@ import textwrap
 import numpy as np
 import pytest
 
+from agents.base import ViewPolicy
 from agents.boundary import Boundary
 from agents.nearest import Nearest
 from agents.pre_dc import PreDC
@@ -39,8 +40,9 @@ def chosen(cluster: Cluster, row: int) -> set[int]:
 
 
 def test_every_name_is_an_entry_point():
-    expected = {f"nearest{n}" for n in range(9)}
-    expected |= set("pre_dc boundary centroid static_cluster strongest_signal random all ppo".split())
+    expected = {f"{family}{n}" for family in ("nearest", "informed") for n in range(9)}
+    expected |= set("adaptive adaptive_informed greedy pre_dc boundary centroid static_cluster".split())
+    expected |= set("strongest_signal random all ppo".split())
     assert expected <= set(policy_names())
     with pytest.raises(ValueError, match="did you mean pre_dc"):
         make_policy("predc", SCENARIO)
@@ -165,7 +167,7 @@ def test_static_cluster_and_all(view):
 
 @pytest.mark.parametrize("n", range(9))
 def test_nearest_counts_further_members_and_keeps_its_head(view, n):
-    cluster = make_policy(f"nearest{n}", SCENARIO).act(view)
+    cluster = make_policy(f"nearest{n}", SCENARIO, hysteresis_m=8.0).act(view)
     eager = Nearest(SCENARIO, n=n, hysteresis_m=0.0).act(view)
     distance = view.distance[view.rows, view.head]
     assert (cluster.head == np.where(distance <= 8, view.head, view.distance.argmin(axis=1))).all()
@@ -173,6 +175,24 @@ def test_nearest_counts_further_members_and_keeps_its_head(view, n):
     for row in range(40):
         others = [node for node in np.argsort(view.distance[row]) if node != cluster.head[row]][:n]
         assert chosen(cluster, row) == {*others, int(cluster.head[row])}
+
+
+def test_a_policy_that_says_so_does_not_look_at_lam(view):
+    """An evaluation plays it once for all lams. What says nothing counts as looking."""
+    other = View(view.row.copy(), view.belief, view.network, view.reports)
+    other.row["lam"] = np.geomspace(0.01, 1000, 40)
+    seeing = set()
+    for name in policy_names():
+        if not name.startswith("ppo"):
+            policy = make_policy(name, SCENARIO)
+            one, two = policy.act(view), policy.act(other)
+            if policy.sees_lam:
+                seeing.add(name)
+            else:
+                assert (one.head == two.head).all() and (one.members == two.members).all(), name
+    assert {"adaptive", "adaptive_informed", "greedy"} <= seeing
+    assert not seeing & {"nearest3", "informed3", "pre_dc", "random"}
+    assert ViewPolicy.sees_lam
 
 
 UNDERWATER = Scenario.named("Underwater-v0", particles=50)

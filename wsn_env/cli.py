@@ -135,7 +135,7 @@ def run_compile(command: Compile) -> None:
     for tracker in ("grnn", "nonlinear_ls"):
         scenarios.append(Scenario.named("Rssi-v0", nodes=20, tracker=tracker, field_seed=0))
     for scenario in (scenario.override(particles=20, periods=2) for scenario in scenarios):
-        for policy in ("pre_dc", "random"):
+        for policy in ("pre_dc", "random", "greedy", "informed2"):
             for state, _ in episodes(make_policy(policy, scenario), World(scenario), [0]):
                 View.from_arrays(View.of(state).as_arrays())
     rollout(make_policy("nearest2", scenario), World(scenario), [0])  # with its bound

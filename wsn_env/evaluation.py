@@ -2,7 +2,8 @@
 
 Every policy meets the same fields, tracks, detections and noises, so that differences are taken episode by episode.
 Work goes in blocks of 50 seeds, whatever the machine: the rows are the same to the byte. Finished blocks are kept
-beside the result, and a run that was stopped continues from them.
+beside the result, and a run that was stopped continues from them. A policy that does not look at lam plays its episodes
+once; at every other lam only the return is another.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from wsn_env.compiling import kernels_stamp
 from wsn_env.files import replacing
 from wsn_env.policies import Policy, make_policy
 from wsn_env.progress import Progress
+from wsn_env.quantity import suggest
 from wsn_env.scenario import Scenario
 from wsn_env.types import Outcome, State
 from wsn_env.view import View
@@ -145,6 +147,24 @@ class Evaluation:
         """Paired difference policy - reference over the common episodes."""
         return Summary.of(self.values(policy, lam, column) - self.values(reference, lam, column))
 
+    def families(self) -> list[str]:
+        """Stems of the policies whose names differ only by a number at the end: "nearest" of nearest0, nearest1, ..."""
+        stems = [stem_of(policy) for policy in self.policies if stem_of(policy) != policy]
+        return [stem for stem in dict.fromkeys(stems) if stems.count(stem) > 1]
+
+    def best_of(self, stem: str, lam: float) -> str:
+        """The member of a numbered family with the best mean return: the best in hindsight.
+
+        Raises:
+            ValueError: for a stem without members, or a lam that was not compared at.
+        """
+        members = [policy for policy in self.policies if policy != stem and stem_of(policy) == stem]
+        if not members:
+            raise ValueError(f"family {stem!r} has no members: {suggest(stem, self.families())}")
+        if lam not in self.lams:
+            raise ValueError(f"lam = {lam:g}: must be one of {', '.join(f'{each:g}' for each in self.lams)}")
+        return max(members, key=lambda policy: self.values(policy, lam, "return").mean())
+
     def save(self, out: str | Path) -> None:
         """Write evaluation.csv and evaluation.json into a folder, each whole or not at all."""
         out = Path(out)
@@ -184,6 +204,11 @@ def evaluation_seeds(seed: int, episodes: int) -> list[int]:
     return [FIRST_SEED + seed * SEEDS_PER_RUN + episode for episode in range(episodes)]
 
 
+def stem_of(policy: str) -> str:
+    """A policy's name without the number at its end."""
+    return policy.rstrip("0123456789")
+
+
 def episodes(
     policy: Policy, world: World, seeds: Sequence[int], begin: Callable[[State], object] | None = None
 ) -> Iterator[tuple[State, Outcome]]:
@@ -207,7 +232,7 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict]:
         world: of a scenario with one lam.
         seeds: reset seeds, one a row.
 
-    Returns: the measured columns of each episode.
+    Returns: the measured columns of each episode, and the sums that its return is made of.
     """
     scenario = world.scenario
     sums = dict.fromkeys(("error", "square", "energy", "members", "handovers", "searches", "lost"), 0.0)
@@ -227,6 +252,8 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict]:
         "lam": state.lam,
         "periods": np.full(len(seeds), n),
         "return": -(sums["error"] + state.lam * sums["energy"]),
+        "sum_error_m": sums["error"],
+        "sum_energy_mj": sums["energy"],
         "error_m": sums["error"] / n,
         "rms_m": np.sqrt(sums["square"] / n),
         "energy_mj": sums["energy"] / n,
@@ -238,6 +265,13 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict]:
         "floor_m": np.full(len(seeds), "") if bound is None else bound.floor_m(state),
     }
     return [{name: values[i].item() for name, values in columns.items()} for i in range(len(seeds))]
+
+
+def at_lam(measured: Sequence[dict], lam: float) -> list[dict]:
+    """The same episodes with the return at another lam: what `rollout` gives of a policy that does not look at it."""
+    return [
+        values | {"lam": lam, "return": -(values["sum_error_m"] + lam * values["sum_energy_mj"])} for values in measured
+    ]
 
 
 def evaluate(
@@ -254,7 +288,7 @@ def evaluate(
 
     Args:
         policies: names, paths of saved policies, or "label=path"; or name -> Policy. The first is the reference of
-            differences.
+            differences. One with `sees_lam = False` plays once for all lams.
         scenario: what they act in.
         lams: the trade-offs [m/mJ]; None: the scenario's, which must then be a single one.
         episodes: common random episodes for each policy and lam.
@@ -281,10 +315,11 @@ def evaluate(
         world = World(scenario.override(lam=lam), threads)
         for name, policy in named.items():
             for number, block in enumerate(blocks):
-                measured = kept.get(name, lam, number, len(block))
+                played_at = lam if getattr(policy, "sees_lam", True) else None  # None: for all
+                measured = kept.get(name, played_at, number, len(block))
                 if measured is None:
-                    measured = kept.put(name, lam, number, rollout(policy, world, block))
-                for i, values in enumerate(measured):
+                    measured = kept.put(name, played_at, number, rollout(policy, world, block))
+                for i, values in enumerate(at_lam(measured, lam)):
                     episode = number * BLOCK + i
                     row = {
                         "policy": name,
@@ -330,11 +365,12 @@ class _Kept:
         with replacing(self._path) as path:
             path.write_text("".join(json.dumps(line) + "\n" for line in [head, *kept]))
 
-    def get(self, name: str, lam: float, number: int, size: int) -> list[dict] | None:
+    def get(self, name: str, lam: float | None, number: int, size: int) -> list[dict] | None:
         measured = self._blocks.get((name, lam, number))
         return measured if measured is not None and len(measured) == size else None
 
-    def put(self, name: str, lam: float, number: int, measured: list[dict]) -> list[dict]:
+    def put(self, name: str, lam: float | None, number: int, measured: list[dict]) -> list[dict]:
+        self._blocks[name, lam, number] = measured
         if self._path is not None:
             with open(self._path, "a") as file:
                 file.write(json.dumps([name, lam, number, measured]) + "\n")

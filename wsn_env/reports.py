@@ -6,7 +6,7 @@ from math import pi, sqrt
 from pathlib import Path
 
 from wsn_env.bounds import bound_kind
-from wsn_env.evaluation import Evaluation
+from wsn_env.evaluation import Evaluation, stem_of
 from wsn_env.files import replacing
 
 EMPHASIS, FAMILY, OTHER, FLOOR = "#D55E00", "#0072B2", "#333333", "#009E73"
@@ -63,6 +63,12 @@ def interval_text(value, digits: int, sign: str = "") -> str:
     return f"{value.mean:{sign}.{digits}f} [{value.low:{sign}.{digits}f}, {value.high:{sign}.{digits}f}]"
 
 
+def best_in_hindsight(evaluation: Evaluation, lam: float) -> list[str]:
+    """A line on the best member of each numbered family, if there is one."""
+    best = [f"{evaluation.best_of(stem, lam)} of {stem}0, 1, ..." for stem in evaluation.families()]
+    return [f"best in hindsight: {', '.join(best)}"] if best else []
+
+
 def wide_console():
     """For the terminal, or as wide as a table wants where the output is a file or a pipe."""
     from rich.console import Console
@@ -80,7 +86,8 @@ def print_tables(evaluation: Evaluation, reference: str | None = None, console=N
     for lam in evaluation.lams:
         title = f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes"
         caption = f"means, 95 % bootstrap intervals; {reference} minus it: paired difference of returns"
-        table = Table(title=title, caption=f"{caption}; {about_the_bound(evaluation)}")
+        lines = f"{caption}; {about_the_bound(evaluation)}", *best_in_hindsight(evaluation, lam)
+        table = Table(title=title, caption="\n".join(lines))
         for name in table_header(evaluation, reference):
             table.add_column(name, justify="left" if name == "policy" else "right")
         for row in table_rows(evaluation, lam, reference):
@@ -103,6 +110,7 @@ def save_markdown(evaluation: Evaluation, folder: str | Path) -> None:
         f"## {evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes\n\n"
         + markdown_table(evaluation, lam, evaluation.policies[0])
         + f"\nMeans with 95 % bootstrap intervals; {about_the_bound(evaluation)}.\n"
+        + "".join(f"\n{line}\n" for line in best_in_hindsight(evaluation, lam))
         for lam in evaluation.lams
     ]
     with replacing(Path(folder) / "evaluation.md") as path:
@@ -130,8 +138,10 @@ def draw_front(evaluation: Evaluation, lam: float, path: str | Path, emphasis: s
         s = evaluation.summary(policy, lam)
         points[policy] = s["energy_mj"], s["error_m"]
         _draw_point(axes, policy, *points[policy], strong=policy == emphasis)
-    for stem in {_stem(policy) for policy in points} - set(points):
-        family = sorted((points[policy][0].mean, points[policy][1].mean) for policy in points if _stem(policy) == stem)
+    for stem in {stem_of(policy) for policy in points} - set(points):
+        family = sorted(
+            (points[policy][0].mean, points[policy][1].mean) for policy in points if stem_of(policy) == stem
+        )
         axes.plot(*zip(*family), color=FAMILY, linewidth=1, label=f"{stem}0, 1, ...", zorder=1)
     floor = evaluation.floor_m()
     if floor is not None:
@@ -157,12 +167,8 @@ def draw_front(evaluation: Evaluation, lam: float, path: str | Path, emphasis: s
     plt.close(figure)
 
 
-def _stem(policy: str) -> str:
-    return policy.rstrip("0123456789")
-
-
 def _draw_point(axes, policy: str, energy, error, strong: bool) -> None:
-    numbered = _stem(policy) != policy
+    numbered = stem_of(policy) != policy
     colour = EMPHASIS if strong else FAMILY if numbered else OTHER
     axes.errorbar(
         energy.mean,
@@ -174,6 +180,6 @@ def _draw_point(axes, policy: str, energy, error, strong: bool) -> None:
         color=colour,
         zorder=3 if strong else 2,
     )
-    label = policy.removeprefix(_stem(policy)) if numbered else policy
+    label = policy.removeprefix(stem_of(policy)) if numbered else policy
     place = (-11, -11) if numbered else (7, 5)
     axes.annotate(label, (energy.mean, error.mean), xytext=place, textcoords="offset points", fontsize=9, color=colour)

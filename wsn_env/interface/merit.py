@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wsn_env.compiling import lean_piece
+from wsn_env.compiling import kernel, lean_piece
 from wsn_env.numerics import exp, normal_cdf
 from wsn_env.physics.field import squared_distance
 from wsn_env.physics.radio import TO_HEAD, outside, transmission
@@ -79,7 +79,7 @@ def _edge(dx, dy, cov, c):
 
 
 @lean_piece
-def _price_mj(detection, positions, node, head, mean, c):
+def price_mj(detection, positions, node, head, mean, c):
     """Expected energy of a node's being awake for the period instead of asleep, and of its report [mJ].
 
     The report goes to the head, or as far as the prediction where the head is still open; to the sink; to the target.
@@ -128,7 +128,7 @@ def order_row(positions, head, mean, cov, lam, nodes, c, detections, ordered, dr
                 drop = np.sqrt(p00 + p11) - np.sqrt(max(p00 + p11 - g, 0.0))
                 value = drop
                 if lam > 0.0:
-                    value -= lam * _price_mj(detections[k], positions, nodes[k], head, mean, c)
+                    value -= lam * price_mj(detections[k], positions, nodes[k], head, mean, c)
                 if value > most:
                     best, most, most_drop, after = k, value, drop, (q00, q01, q11)
         if best < 0:
@@ -177,3 +177,18 @@ def _nearest_ahead(positions, mean, nodes, c):
             if squared < shortest:
                 best, shortest = node, squared
     return best
+
+
+@kernel
+def order_by_merit(start, stop, cs, positions, heads, beliefs, lams, nodes, ordered):
+    """`order_row` for every row.
+
+    Args:
+        heads, lams: (B,).
+        nodes: (B, K) candidates, -1: none.
+        ordered: (B, K) filled.
+    """
+    detections, drops = np.empty(nodes.shape[1]), np.empty(nodes.shape[1])
+    for b in range(start, stop):
+        mean, cov = beliefs[b].predicted_mean, beliefs[b].predicted_cov
+        order_row(positions[b], heads[b], mean, cov, lams[b], nodes[b], cs[0], detections, ordered[b], drops)

@@ -50,6 +50,13 @@ def transmission(bits, squared, c):
 
 
 @lean_piece
+def relayed(bits, squared, c):
+    """The same over as many hops as it takes, with what the relays pay for receiving."""
+    hops = max(np.ceil(np.sqrt(squared) / c.hop_m), 1.0)
+    return hops * transmission(bits, squared, c) + (hops - 1.0) * bits * c.rx_j_per_bit
+
+
+@lean_piece
 def in_one_hop(node, other, positions, c):
     """Whether a packet goes from node to node at once."""
     return squared_distance(positions, node, positions[other, 0], positions[other, 1]) <= c.hop_m * c.hop_m
@@ -136,9 +143,7 @@ def _hand_over(old, head, state, outcome, b, c):
     """
     positions, battery = state.network.positions[b], state.network.battery[b]
     squared = squared_distance(positions, old, positions[head, 0], positions[head, 1])
-    hops = max(np.ceil(np.sqrt(squared) / c.hop_m), 1.0)
-    sending = hops * transmission(c.handover_bits, squared, c) + (hops - 1.0) * c.handover_bits * c.rx_j_per_bit
-    if battery[old] <= 0.0 or not spend(old, sending, HANDOVER, state, outcome, b):
+    if battery[old] <= 0.0 or not spend(old, relayed(c.handover_bits, squared, c), HANDOVER, state, outcome, b):
         return False
     return battery[head] > 0.0 and spend(head, c.handover_bits * c.rx_j_per_bit, HANDOVER, state, outcome, b)
 
