@@ -102,7 +102,7 @@ def order_by_merit(start, stop, cs, positions, heads, beliefs, lams, nodes, orde
         lams: (B,) m/mJ; 0: by information alone.
         heads: (B,) a head that senses anyhow and is conditioned on first; -1: none.
         nodes: (B, K) candidates, -1: none.
-        ordered: (B, K) filled; -1 at the end where candidates are missing or are the head.
+        ordered: (B, M) filled with the first M of them; -1 at the end where candidates are missing or are the head.
     """
     c = cs[0]
     size = nodes.shape[1]
@@ -118,7 +118,7 @@ def order_by_merit(start, stop, cs, positions, heads, beliefs, lams, nodes, orde
             used[k] = nodes[b, k] < 0 or nodes[b, k] == heads[b]
             if not used[k]:
                 detections[k] = mean_detection(positions[b], nodes[b, k], mean, cov, c)
-        for slot in range(size):
+        for slot in range(ordered.shape[1]):
             best, most, after = -1, -np.inf, (p00, p01, p11)
             for k in range(size):
                 if not used[k]:
