@@ -11,6 +11,7 @@ from agents.base import ViewPolicy
 from agents.tuned import tuned
 from wsn_env.interface.merit import order_by_merit
 from wsn_env.physics.constants import constants
+from wsn_env.physics.field import distances_to
 from wsn_env.quantity import check_quantity, suggest
 from wsn_env.scenario import Scenario
 from wsn_env.types import Cluster
@@ -57,13 +58,14 @@ def surround(view: View, scenario: Scenario, order: str, hysteresis_m, sizes, mo
         most: no size is larger.
     """
     standing = view.head >= 0
-    distance = np.where(standing, view.distance[view.rows, np.maximum(view.head, 0)], np.inf)
+    at = view.positions[view.rows, np.maximum(view.head, 0)][:, None]
+    distance = np.where(standing, distances_to(at, view.prediction)[:, 0], np.inf)
     kept = np.where(standing & (distance <= hysteresis_m), view.head, -1)
     if order == "nearest":
         nodes = view.nearest(most + 1)[0]
     else:
         candidates = view.nearest(max(CANDIDATES, most + 1), scenario.ring_m)[0]
-        nodes, free = np.empty_like(candidates), np.zeros(len(kept))
+        nodes, free = np.empty((len(kept), most + 1), np.int64), np.zeros(len(kept))
         order_by_merit(0, len(kept), constants(scenario), view.positions, kept, view.belief, free, candidates, nodes)
     head = np.where(kept >= 0, kept, nodes[:, 0])
     others = (nodes >= 0) & (nodes != head[:, None])

@@ -32,6 +32,7 @@ FLOORS = {
     "agents": 5,
     "wsn_env.env": 6,
     "wsn_env.vector_env": 6,
+    "agents.planner": 7,  # it rehearses and compares
     "agents.sb3": 7,  # adapts the vector environment
     "wsn_env.evaluation": 7,
     "wsn_env.reports": 7,

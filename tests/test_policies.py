@@ -42,7 +42,7 @@ def chosen(cluster: Cluster, row: int) -> set[int]:
 def test_every_name_is_an_entry_point():
     expected = {f"{family}{n}" for family in ("nearest", "informed") for n in range(9)}
     expected |= set("adaptive adaptive_informed greedy pre_dc boundary centroid static_cluster".split())
-    expected |= set("strongest_signal random all ppo".split())
+    expected |= set("strongest_signal random all planner ppo".split())
     assert expected <= set(policy_names())
     with pytest.raises(ValueError, match="did you mean pre_dc"):
         make_policy("predc", SCENARIO)

@@ -107,8 +107,8 @@ def order_row(positions, head, mean, cov, lam, nodes, c, detections, ordered, dr
         lam: m/mJ; 0: by information alone.
         nodes: (K,) candidates, -1: none.
         detections: (K,) room for their probabilities.
-        ordered: (K,) filled; -1 at the end where candidates are missing or are the head.
-        drops: (K,) filled with the drop that each brings [m].
+        ordered: (M,) filled with the first M of them; -1 at the end where candidates are missing or are the head.
+        drops: (K,) room for the drop that each brings [m].
     """
     p00, p01, p11 = cov[0, 0], cov[0, 2], cov[2, 2]
     if head >= 0:
@@ -120,7 +120,7 @@ def order_row(positions, head, mean, cov, lam, nodes, c, detections, ordered, dr
         detections[k] = -1.0  # taken
         if nodes[k] >= 0 and nodes[k] != head:
             detections[k] = mean_detection(positions, nodes[k], mean, cov, c)
-    for slot in range(len(nodes)):
+    for slot in range(len(ordered)):
         best, most, most_drop, after = -1, -np.inf, 0.0, (p00, p01, p11)
         for k in range(len(nodes)):
             if detections[k] >= 0.0:
@@ -186,7 +186,7 @@ def order_by_merit(start, stop, cs, positions, heads, beliefs, lams, nodes, orde
     Args:
         heads, lams: (B,).
         nodes: (B, K) candidates, -1: none.
-        ordered: (B, K) filled.
+        ordered: (B, M) filled with the first M of them.
     """
     detections, drops = np.empty(nodes.shape[1]), np.empty(nodes.shape[1])
     for b in range(start, stop):

@@ -1,0 +1,172 @@
+"""Worlds drawn from what a network believes, for a planner to try its choices in.
+
+Nothing of the truth enters: not the track, and not the key that the real detections and noises come from.
+"""
+
+from __future__ import annotations
+
+from numba import uint64
+
+from wsn_env import draws
+from wsn_env.compiling import kernel, lean_piece, piece
+from wsn_env.physics.constants import constants
+from wsn_env.physics.motion import advance
+from wsn_env.physics.sensing import POSITION, strength, strength_slope
+from wsn_env.scenario import Scenario
+from wsn_env.trackers.kernels import redraw_row
+from wsn_env.trackers.resampling import correlated, lower_root
+from wsn_env.types import Belief, Network, Reports, State, network_of, state_of
+from wsn_env.view import View
+from wsn_env.world import World
+
+
+def imagined_world(scenario: Scenario, periods: int, particles: int) -> World:
+    """The scenario with another horizon and a cheap filter at the head; prices and noises are the same.
+
+    Args:
+        particles: of a particle filter; 0: a `GaussianTracker`, which cannot read binary sensors.
+    """
+    changes = dict(periods=periods, motion="straight", filter_q=scenario.filter_q)
+    changes |= dict(tracker="particle", particles=max(particles, 2), gate_m=None)
+    if scenario.radio.handover == "particles":  # as many as there really are
+        changes |= dict(handover="estimate", handover_bits=scenario.handover_bits)
+    world = World(scenario.override(**changes), threads=1)
+    if particles == 0:
+        world.tracker = GaussianTracker(scenario)
+    return world
+
+
+def draw_worlds(state: State, view: View, world: World, first: int, count: int) -> None:
+    """Fill a state with worlds number first, ..., first + count - 1, drawn from a belief, again and again.
+
+    The target comes from the belief's mean and covariance (eqs. 9-13 of Xiang & Guo, 2013, say what these are) and
+    moves by constant velocity with the filter's noise (eq. 8). Worlds 2i and 2i + 1 lie on opposite sides of the mean.
+    A world's draws depend on its number and the view's luck alone.
+
+    Args:
+        state: (n * count rows) filled; row b is world first + b % count.
+        view: of one row.
+        world: of the `imagined_world`.
+    """
+    about = world.scenario.filter_q, world.scenario.period_s, world.scenario.tracking.search_gap
+    known = view.row, view.belief, view.reports.bitmap, *view.network.arrays()
+    _draw_worlds(first, count, *about, state.arrays(), known)
+
+
+@kernel
+def _draw_worlds(first, count, q, period_s, search_gap, arrays, known):
+    state, row, belief, bitmap, network = state_of(arrays), known[0][0], known[1][0], known[2][0], network_of(known[3:])
+    for b in range(len(state.key)):
+        number = first + b % count
+        key, pair = _world_key(row.luck, number), _world_key(row.luck, number - number % 2)
+        state.key[b] = key
+        mine, own = state.row[b], state.belief.row[b]
+        mine.period = 0
+        mine.lam = row.lam
+        mine.log_miss = row.log_miss
+        mine.last_search = -search_gap  # of an earlier one the view as an observation says nothing
+        own.mean[:], own.cov[:] = belief.mean, belief.cov
+        own.predicted_mean[:], own.predicted_cov[:] = belief.predicted_mean, belief.predicted_cov
+        if state.belief.particles.shape[2] > 0:
+            redraw_row(key, 0, state.belief, b)
+        _copy_network(network, state.network, b)
+        state.reports.count[b] = 0
+        state.reports.bitmap[b] = bitmap
+        state.sensed[b] = bitmap
+
+        side = 1.0 if number % 2 == 0 else -1.0
+        track, off = state.track[b], correlated(draws.stream(pair, 0, draws.START), 0, lower_root(own.cov))
+        for axis in range(4):
+            track[0, axis] = own.mean[axis] + side * off[axis]
+        for k in range(len(track) - 1):
+            ax, ay = draws.normal_pair(draws.stream(pair, 0, draws.TRACK), k)
+            advance(track[k], period_s, side * q * ax, side * q * ay, track[k + 1])
+
+
+@lean_piece
+def _world_key(luck, number):
+    return draws.mix((uint64(luck) << uint64(32)) + uint64(number))
+
+
+@piece
+def _copy_network(network, copy, b):
+    """Batteries and the standing cluster; the rest has its place once `place_nodes` has been."""
+    standing, count = copy.row[b], network.row[0].n_members
+    standing.alive = network.row[0].alive
+    standing.head = network.row[0].head
+    standing.n_members = count
+    copy.battery[b] = network.battery[0]
+    copy.members[b, :count] = network.members[0, :count]
+
+
+def place_nodes(state: State, view: View) -> None:
+    """Put the nodes of all rows where the view of one row has them."""
+    for copy, original in zip((state.network.positions, *state.network.grid), (view.positions, *view.network.grid)):
+        copy[:] = original
+
+
+class GaussianTracker:
+    """An extended Kalman filter, report by report, whose strengths are linearised at the root mean square distance:
+    one that is sure to be near would else take a strength for more than it says.
+
+    It stands in for the particle filter where few numbers must do: what it believes has no sampling noise.
+    """
+
+    particles = 0
+
+    def __init__(self, scenario: Scenario):
+        if scenario.binary:
+            raise ValueError("particles = 0: must be at least 2 where nodes report one bit")
+        self._constants = constants(scenario)
+
+    def start(self, keys, periods, rows, belief: Belief) -> None:
+        """Mean and covariance are all there is."""
+
+    def relocate(self, keys, periods, rows, belief: Belief) -> None:
+        """The search has set them."""
+
+    def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
+        """Correct the predictions with the reports, in place."""
+        _correct_rows(self._constants, belief.row, network.positions, reports.count, reports.node, reports.value)
+
+
+@kernel
+def _correct_rows(cs, beliefs, positions, count, node, value):
+    c = cs[0]
+    r = max(c.noise * c.noise, 1e-12)
+    for b in range(len(beliefs)):
+        mean, cov = beliefs[b].mean, beliefs[b].cov
+        mean[:], cov[:] = beliefs[b].predicted_mean, beliefs[b].predicted_cov
+        for j in range(count[b]):
+            if c.model == POSITION:
+                _correct(mean, cov, 1.0, 0.0, value[b, j, 0] - mean[0], r)
+                _correct(mean, cov, 0.0, 1.0, value[b, j, 1] - mean[2], r)
+            else:
+                dx = mean[0] - positions[b, node[b, j], 0]
+                dy = mean[2] - positions[b, node[b, j], 1]
+                squared = max(dx * dx + dy * dy + 0.5 * (cov[0, 0] + cov[2, 2]), c.floor_m * c.floor_m)
+                slope = strength_slope(squared, c)
+                _correct(mean, cov, slope * dx, slope * dy, value[b, j, 0] - strength(squared, c), r)
+
+
+@lean_piece
+def _correct(mean, cov, hx, hy, innovation, r):
+    """One number z = hx x + hy y + noise of variance r: P h / (h' P h + r) is the gain."""
+    ph = (
+        cov[0, 0] * hx + cov[0, 2] * hy,
+        cov[1, 0] * hx + cov[1, 2] * hy,
+        cov[2, 0] * hx + cov[2, 2] * hy,
+        cov[3, 0] * hx + cov[3, 2] * hy,
+    )
+    s = hx * ph[0] + hy * ph[2] + r
+    for i in range(4):
+        mean[i] += ph[i] * innovation / s
+        for k in range(4):
+            cov[i, k] -= ph[i] * ph[k] / s
+
+
+def rows_of(value, rows):
+    """Some rows of a View or of nested NamedTuples of arrays: a slice, or their numbers."""
+    if isinstance(value, View):
+        return View(*(rows_of(part, rows) for part in (value.row, value.belief, value.network, value.reports)))
+    return type(value)(*(rows_of(part, rows) for part in value)) if isinstance(value, tuple) else value[rows]

@@ -1,0 +1,238 @@
+"""A policy that looks ahead: it plays its choices in worlds drawn from the belief, and takes what comes cheapest.
+
+`python -m agents.planner --scenario Rssi-v0 --episodes 200` compares it with the fixed clusters and prints what a
+decision costs.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from agents.base import ViewPolicy
+from agents.imagined import draw_worlds, imagined_world, place_nodes, rows_of
+from agents.nearest import Nearest
+from wsn_env.evaluation import evaluate, rollout
+from wsn_env.interface.actions import MENU_MEMBERS, MenuAction
+from wsn_env.interface.rewards import DISBELIEF
+from wsn_env.policies import Policy, make_policy
+from wsn_env.progress import progress_bar
+from wsn_env.quantity import check_quantity
+from wsn_env.scenario import Scenario
+from wsn_env.sections import Binary, Position
+from wsn_env.types import Cluster, State
+from wsn_env.view import View
+from wsn_env.world import World
+
+ROWS = 320  # worlds played side by side: some 16 for each choice at first
+CANDIDATES = 12
+RAYLEIGH = 0.886  # mean over root mean square of the length of a normal vector in the plane
+REHEARSALS = 20  # episodes, of training seeds
+PARTICLES = 200  # where the imagined head needs any
+
+
+class Choices(NamedTuple):
+    """Clusters to choose from, the rule's own first."""
+
+    heads: np.ndarray  # (C,)
+    members: np.ndarray  # (C, M)
+
+
+@dataclass(frozen=True)
+class Planner(ViewPolicy):
+    """A rollout algorithm (Bertsekas, Rollout, Policy Iteration, and Distributed Reinforcement Learning, 2020, ch. 2).
+
+    Every choice of the menu, and the rule's own, is played for a period in worlds drawn from the belief; then the rule
+    goes on to the horizon. All choices meet the same worlds. Those that are dearer than the cheapest by more than
+    `doubt` standard errors drop out, round by round. The rule's own choice is taken unless it has dropped out; then
+    the cheapest. So the planner does better than its rule, but for chance and for what lies beyond the horizon.
+
+    A period costs the error that the imagined head believes in (the true one where that is wrong beyond doubt; what is
+    believed varies less) plus lam times the energy. `World.step` plays it, with a Gaussian filter at the head, or with
+    a particle filter where nodes report one bit.
+    """
+
+    horizon: int = 8  # periods
+    worlds: int = 96  # for each choice that stays in doubt
+    doubt: float = 1.0  # standard errors
+    discount: float = 1.0  # a period
+    particles: int | None = None  # of the imagined filter; 0: it is Gaussian; None: 0 where it can read the reports
+    rule: Policy | None = None  # None: the fixed size, see `Nearest`, that rehearsals found best for the row's lam
+    order: str | None = None  # of merit; None: nearest for positions and bits, information for strengths
+
+    def __post_init__(self):
+        check_quantity("Planner", "horizon", self.horizon, at_least=1, whole=True)
+        check_quantity("Planner", "worlds", self.worlds, at_least=4, whole=True)
+        check_quantity("Planner", "doubt", self.doubt, at_least=0)
+        check_quantity("Planner", "discount", self.discount, above=0, at_most=1)
+        check_quantity("Planner", "particles", self.particles, at_least=0, whole=True, optional=True)
+
+    @cached_property
+    def _order(self) -> str:
+        nearest = isinstance(self.scenario.measurement, (Position, Binary))
+        return self.order or ("nearest" if nearest else "information")
+
+    @cached_property
+    def _menu(self) -> MenuAction:
+        return MenuAction(self.scenario, self._order, CANDIDATES)
+
+    @cached_property
+    def _world(self) -> World:
+        usual = PARTICLES if self.scenario.binary else 0
+        return imagined_world(self.scenario, self.horizon, usual if self.particles is None else self.particles)
+
+    @cached_property
+    def _rehearsed(self) -> tuple[list[Nearest], np.ndarray, np.ndarray]:
+        """Fixed sizes with their mean error [m] and energy [mJ] in a period."""
+        world = World(self.scenario.override(lam=0.0), threads=1)
+        rules = [Nearest(self.scenario, n, order=self._order) for n in range(MENU_MEMBERS + 1)]
+        played = [rollout(rule, world, range(REHEARSALS)) for rule in rules]
+        means = [[np.mean([row[name] for row in rows]) for rows in played] for name in ("error_m", "energy_mj")]
+        return rules, np.array(means[0]), np.array(means[1])
+
+    def rule_for(self, lam: float) -> Policy:
+        """What is played after the choice."""
+        if self.rule is not None:
+            return self.rule
+        rules, errors_m, energies_mj = self._rehearsed
+        return rules[int((errors_m + lam * energies_mj).argmin())]
+
+    def act(self, view: View) -> Cluster:
+        """Plan for every row, one after the other."""
+        room = self._world.allocate(ROWS)
+        chosen = [self._plan(rows_of(view, slice(row, row + 1)), room) for row in range(len(view.row))]
+        width = max((len(members) for _, members in chosen), default=0)
+        members = np.full((len(chosen), width), -1, np.int32)
+        for row, (_, own) in enumerate(chosen):
+            members[row, : len(own)] = own
+        return Cluster(np.array([head for head, _ in chosen], np.int64), members)
+
+    def _plan(self, view: View, room: State) -> tuple[int, np.ndarray]:
+        """The head and the members for a view of one row."""
+        rule, lam = self.rule_for(view.lam[0]), view.lam[0]
+        choices = self._choices(view, rule)
+        left, costs = np.arange(len(choices.heads)), np.empty((len(choices.heads), 0))
+        place_nodes(room, view)
+        while len(left) > 1 and costs.shape[1] < self.worlds:
+            done = costs.shape[1]
+            count = 2 * min((self.worlds - done + 1) // 2, len(room.key) // (2 * len(left)))
+            state = rows_of(room, slice(len(left) * count))
+            draw_worlds(state, view, self._world, done, count)
+            first = Cluster(choices.heads[left].repeat(count), choices.members[left].repeat(count, axis=0))
+            new = self._play(state, first, rule, lam).reshape(len(left), count)
+            costs = np.concatenate([costs, new], axis=1)
+            stays = _in_doubt(costs, self.doubt)
+            left, costs = left[stays], costs[stays]
+        best = 0 if left[0] == 0 else left[costs.mean(axis=1).argmin()]
+        return choices.heads[best], choices.members[best]
+
+    def _choices(self, view: View, rule: Policy) -> Choices:
+        """The rule's own and those of the menu, each once."""
+        own = rule.act(view)
+        entries = np.flatnonzero(self._menu.masks(view)[0])
+        menu = self._menu.cluster(entries, rows_of(view, np.zeros(len(entries), int)))
+        width = max(own.members.shape[1], menu.members.shape[1])
+        members = np.full((1 + len(entries), width), -1, np.int32)
+        members[:1, : own.members.shape[1]], members[1:, : menu.members.shape[1]] = own.members, menu.members
+        heads = np.concatenate([own.head, menu.head])
+        named = [(head, frozenset(row) - {-1, head}) for head, row in zip(heads.tolist(), members.tolist())]
+        first = [named.index(name) for name in dict.fromkeys(named)]
+        return Choices(heads[first], members[first])
+
+    def _play(self, state: State, choice: Cluster, rule: Policy, lam: float) -> np.ndarray:
+        """(B,) discounted costs of the choice and the rule after it [m]; the state's arrays are used up."""
+        costs, weight = np.zeros(len(state.key)), 1.0
+        for period in range(self.horizon):
+            cluster = choice if period == 0 else rule.act(View.of(state))
+            state, outcome = self._world.step(state, cluster, donate=True)
+            wrong = outcome.error_m > DISBELIEF * outcome.posterior_rms_m
+            error = np.where(wrong, outcome.error_m, RAYLEIGH * outcome.posterior_rms_m)
+            costs += weight * (error + lam * outcome.energy_mj)
+            weight *= self.discount
+        return costs
+
+
+def _in_doubt(costs: np.ndarray, doubt: float) -> np.ndarray:
+    """(C,) bool: which choices are not plainly dearer than the cheapest.
+
+    Args:
+        costs: (C, W) in common worlds, 2i and 2i + 1 a pair on both sides of the belief's mean.
+        doubt: in standard errors of the mean difference.
+    """
+    pairs = 0.5 * (costs[:, ::2] + costs[:, 1::2])
+    differences = pairs - pairs[pairs.mean(axis=1).argmin()]
+    errors = differences.std(axis=1) / max(pairs.shape[1] - 1, 1) ** 0.5
+    return differences.mean(axis=1) <= doubt * errors
+
+
+class Timed:
+    """A policy with a stopwatch."""
+
+    def __init__(self, policy: Policy):
+        self.policy = policy
+        self.sees_lam = getattr(policy, "sees_lam", True)
+        self.seconds, self.decisions = 0.0, 0
+
+    def act(self, view: View) -> Cluster:
+        """What the policy chooses; its processor time counts, other programs' does not."""
+        started = time.process_time()
+        cluster = self.policy.act(view)
+        self.seconds += time.process_time() - started
+        self.decisions += len(view.row)
+        return cluster
+
+
+@dataclass
+class Comparison:
+    """The planner against fixed clusters on common random episodes, and what a decision costs."""
+
+    scenario: str = "PreDC-v0"
+    """Scenario id."""
+    lam: float | None = None
+    """Trade-off between error and energy [m/mJ]; left out: the scenario's."""
+    episodes: int = 200
+    """Episodes for each policy."""
+    seed: int = 0
+    """Which episodes, as of `wsn evaluate`."""
+    against: list[str] = field(
+        default_factory=lambda: [f"{stem}{n}" for stem in ("nearest", "informed") for n in range(9)]
+    )
+    """Policies by name."""
+    horizon: int = Planner.horizon
+    """Periods that the planner looks ahead."""
+    worlds: int = Planner.worlds
+    """Worlds that it imagines for each choice."""
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Compare and print."""
+    import tyro
+
+    from wsn_env.reports import print_tables
+
+    settings = tyro.cli(Comparison, args=arguments)
+    scenario = Scenario.named(settings.scenario, **({} if settings.lam is None else {"lam": settings.lam}))
+    planner = Planner(scenario, settings.horizon, settings.worlds)
+    planner.act(View.of(World(scenario).reset([0])))  # compiles and rehearses
+    policies = {"planner": planner} | {name: make_policy(name, scenario) for name in settings.against}
+    timed = {name: Timed(policy) for name, policy in policies.items()}
+    with progress_bar() as report:
+        found = evaluate(timed, scenario, None, settings.episodes, settings.seed, progress=report, threads=1)
+    print_tables(found)
+    for lam in found.lams:
+        rival = max(settings.against, key=lambda name: found.values(name, lam, "return").mean())
+        gain, share = found.difference("planner", rival, lam), -100 / found.values(rival, lam, "return").mean()
+        print(
+            f"planner - {rival}: {gain.mean:+.2f} [{gain.low:+.2f}, {gain.high:+.2f}] m,"
+            f" {share * gain.mean:+.1f} % [{share * gain.low:+.1f}, {share * gain.high:+.1f}]"
+        )
+    for name in ("planner", rival):
+        print(f"{name}: {1e3 * timed[name].seconds / timed[name].decisions:.3g} ms a decision on one core")
+
+
+if __name__ == "__main__":
+    main()
