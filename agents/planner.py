@@ -18,7 +18,7 @@ from agents.imagined import draw_worlds, imagined_world, place_nodes, rows_of
 from agents.nearest import Nearest
 from wsn_env.evaluation import evaluate, rollout
 from wsn_env.interface.actions import MENU_MEMBERS, MenuAction
-from wsn_env.interface.rewards import DISBELIEF
+from wsn_env.interface.rewards import belief_cost
 from wsn_env.policies import Policy, make_policy
 from wsn_env.progress import progress_bar
 from wsn_env.quantity import check_quantity
@@ -30,7 +30,6 @@ from wsn_env.world import World
 
 ROWS = 320  # worlds played side by side: some 16 for each choice at first
 CANDIDATES = 12
-RAYLEIGH = 0.886  # mean over root mean square of the length of a normal vector in the plane
 REHEARSALS = 20  # episodes, of training seeds
 PARTICLES = 200  # where the imagined head needs any
 
@@ -149,9 +148,7 @@ class Planner(ViewPolicy):
         for period in range(self.horizon):
             cluster = choice if period == 0 else rule.act(View.of(state))
             state, outcome = self._world.step(state, cluster, donate=True)
-            wrong = outcome.error_m > DISBELIEF * outcome.posterior_rms_m
-            error = np.where(wrong, outcome.error_m, RAYLEIGH * outcome.posterior_rms_m)
-            costs += weight * (error + lam * outcome.energy_mj)
+            costs += weight * (belief_cost(outcome.row) + lam * outcome.energy_mj)
             weight *= self.discount
         return costs
 
