@@ -8,7 +8,7 @@ import numpy as np
 
 from wsn_env.physics.sensing import detection_probability
 from wsn_env.scenario import Scenario
-from wsn_env.types import Cluster
+from wsn_env.types import KEEP_CLUSTER, Cluster
 from wsn_env.view import View
 
 
@@ -37,6 +37,8 @@ class ViewPolicy:
         chosen = np.zeros((len(cluster.head), nodes), dtype=np.int64)
         rows, slots = np.nonzero(cluster.members >= 0)
         chosen[rows, cluster.members[rows, slots]] = 1
+        kept = cluster.head == KEEP_CLUSTER
+        chosen[kept] = view.member[kept]
         heads = np.where(cluster.head < 0, view.head, cluster.head)  # -1 keeps the head; before there is one
         heads = np.where(heads < 0, view.nearest_living(), heads)  # the world takes the nearest living node
         heads = np.maximum(heads, 0)

@@ -297,7 +297,7 @@ PRESETS = {
         lam=0.006,
         typical_error_m=16.0,
         typical_energy_mj=1400.0,
-        reference_error_m=75.0,
+        reference_error_m=120.0,
         reference_energy_mj=2200.0,
         field=Field(nodes=64, side_m=1000.0, layout="grid"),
         motion=Cruise(),
