@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wsn_env.evaluation import RESAMPLES, Evaluation, Summary, versions
+from wsn_env.evaluation import RESAMPLES, Evaluation, Summary, stem_of, versions
 from wsn_env.files import replacing
 from wsn_env.scenario import Scenario
 
@@ -90,7 +90,7 @@ def fronts(evaluation: Evaluation) -> Fronts:
 
 def numbered(policy: str) -> tuple[str, str]:
     """("nearest", "3") from "nearest3"; ("pre_dc", "") from "pre_dc"."""
-    stem = policy.rstrip("0123456789")
+    stem = stem_of(policy)
     return stem, policy[len(stem) :]
 
 
