@@ -120,19 +120,28 @@ def order_row(positions, head, mean, cov, lam, nodes, c, detections, ordered, dr
         detections[k] = -1.0  # taken
         if nodes[k] >= 0 and nodes[k] != head:
             detections[k] = mean_detection(positions, nodes[k], mean, cov, c)
+    # Positions tell the same from everywhere: who is most likely to detect tells most.
+    by_chance = c.model == POSITION and lam == 0.0
     for slot in range(len(ordered)):
         best, most, most_drop, after = -1, -np.inf, 0.0, (p00, p01, p11)
         for k in range(len(nodes)):
-            if detections[k] >= 0.0:
-                g, q00, q01, q11 = gain(detections[k], positions, nodes[k], mean, cov, p00, p01, p11, c)
-                drop = np.sqrt(p00 + p11) - np.sqrt(max(p00 + p11 - g, 0.0))
-                value = drop
-                if lam > 0.0:
-                    value -= lam * price_mj(detections[k], positions, nodes[k], head, mean, c)
-                if value > most:
-                    best, most, most_drop, after = k, value, drop, (q00, q01, q11)
+            if detections[k] < 0.0 or (by_chance and detections[k] <= most):
+                continue
+            if by_chance:
+                best, most = k, detections[k]
+                continue
+            g, q00, q01, q11 = gain(detections[k], positions, nodes[k], mean, cov, p00, p01, p11, c)
+            drop = np.sqrt(p00 + p11) - np.sqrt(max(p00 + p11 - g, 0.0))
+            value = drop
+            if lam > 0.0:
+                value -= lam * price_mj(detections[k], positions, nodes[k], head, mean, c)
+            if value > most:
+                best, most, most_drop, after = k, value, drop, (q00, q01, q11)
         if best < 0:
             break
+        if by_chance:
+            g, q00, q01, q11 = gain(most, positions, nodes[best], mean, cov, p00, p01, p11, c)
+            most_drop, after = np.sqrt(p00 + p11) - np.sqrt(max(p00 + p11 - g, 0.0)), (q00, q01, q11)
         detections[best] = -1.0
         ordered[slot] = nodes[best]
         drops[slot] = most_drop
