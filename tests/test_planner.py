@@ -155,9 +155,10 @@ def test_the_comparison_tells_what_a_decision_costs(capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "least"), [("PreDC-v0", -0.02), ("Rssi-v0", 0.02)])
+@pytest.mark.parametrize(("name", "least"), [("PreDC-v0", -0.02), ("Rssi-v0", 0.0)])
 def test_it_is_ahead_of_the_best_fixed_cluster_in_hindsight(name, least):
-    """30 episodes tell the means of PreDC-v0 apart to 3 % only: there the interval may reach 2 % below."""
+    """The difference of 30 episodes has a standard error of some 2 % of the return and more: where 200 show a gain of
+    2.5 % (PreDC-v0) the interval may reach 2 % below 0, where they show 6 % (Rssi-v0) it lies above."""
     scenario = Scenario.named(name, lam=4.0)
     rules = {f"{order}{n}": Nearest(scenario, n, order=order) for order in ORDERS for n in range(4)}
     found = evaluate({"planner": Planner(scenario)} | rules, scenario, episodes=30, seed=9002, threads=1)
