@@ -46,7 +46,7 @@ class Study:
     """Which of them."""
 
 
-def make_maskable_ppo(envs, seed: int, **more):
+def make_maskable_ppo(envs, **more):
     """PPO that never takes an entry that stands for another."""
     from sb3_contrib import MaskablePPO
 
@@ -56,7 +56,7 @@ def make_maskable_ppo(envs, seed: int, **more):
     )
 
 
-def make_recurrent_ppo(envs, seed: int, **more):
+def make_recurrent_ppo(envs, **more):
     """PPO with an LSTM before actor and critic."""
     from sb3_contrib import RecurrentPPO
 
@@ -73,7 +73,7 @@ def usual() -> dict:
     return dict(learning_rate=LinearSchedule(2e-3, 0.0, 1.0), gamma=0.9, gae_lambda=0.9, ent_coef=5e-4)
 
 
-def make_sac(envs, seed: int, **more):
+def make_sac(envs, **more):
     """Soft actor-critic: one update of 256 transitions for every 16 periods."""
     from stable_baselines3 import SAC
 
@@ -123,9 +123,7 @@ def one(study: Study, scenario: Scenario, name: str, seed: int) -> dict[float, n
         span = scenario.override(lam=scenario.lam_span)
         speaks = dict(action=action, observation="menu", order="nearest" if scenario.locates else "information")
         envs = ClusterVectorEnv(ROWS, span, reward="belief", autoreset_mode="Disabled", **speaks)
-        model = maker(
-            SB3VecEnv(envs, scaled=True, stagger=True, calibrated=True), seed, seed=10**6 * seed, device="cpu"
-        )
+        model = maker(SB3VecEnv(envs, scaled=True, stagger=True, calibrated=True), seed=10**6 * seed, device="cpu")
         started = time.perf_counter()
         model.learn(study.steps)
         seconds = time.perf_counter() - started
