@@ -17,9 +17,10 @@ import tyro
 
 from agents.ppo import PPOPolicy
 from wsn_env.cli import make_scenario
-from wsn_env.evaluation import Evaluation, Summary, evaluate, forget_blocks
+from wsn_env.evaluation import Evaluation, evaluate, forget_blocks
 from wsn_env.files import replacing
-from wsn_env.front import hypervolume, numbered, reference_point
+from wsn_env.front import hypervolumes, joined, numbered, points_of, reference_point
+from wsn_env.intervals import Summary
 from wsn_env.policies import make_policy, policy_names
 from wsn_env.progress import progress_bar
 
@@ -125,28 +126,17 @@ def bounds(evaluation: Evaluation, trained: list[str]) -> str:
 
 
 def volumes(evaluation: Evaluation, trained) -> str:
-    """Hypervolume of each training's front, and of the union of all rules'; and the difference, over the episodes."""
+    """Hypervolume of the union of all rules, and of each training's front with the paired difference to it."""
     reference = reference_point(evaluation.scenario)
-
-    def points(names):
-        columns = [
-            [evaluation.values(n, lam, c) for c in ("error_m", "energy_mj")] for n in names for lam in evaluation.lams
-        ]
-        return np.unique(np.array(columns), axis=0).transpose(2, 0, 1)  # (episodes, points, 2)
-
-    rules = points([name for name in evaluation.policies if name not in trained])
-    rng, lines = np.random.default_rng(0), []
-    picks = [rng.integers(evaluation.episodes, size=evaluation.episodes) for _ in range(500)]
-    theirs = np.array([hypervolume(rules[pick].mean(axis=0), reference) for pick in picks])
-    whole = hypervolume(rules.mean(axis=0), reference)
-    lines.append(f"Hypervolume up to {reference[0]:g} m, {reference[1]:g} mJ: all rules together {whole:.4f}")
+    by_policy = {name: points_of(evaluation, name) for name in evaluation.policies}
+    rules = joined(points for name, points in by_policy.items() if name not in trained)
+    lines = []
     for name in trained:
-        own = points([name])
-        mine = np.array([hypervolume(own[pick].mean(axis=0), reference) for pick in picks])
-        value = hypervolume(own.mean(axis=0), reference)
-        low, high = np.percentile(mine - theirs, [2.5, 97.5])
-        lines.append(f"- {name}: {value:.4f}; {value - whole:+.4f} [{low:+.4f}, {high:+.4f}]")
-    return "\n".join(lines) + "\n"
+        own, theirs = hypervolumes({name: by_policy[name], "rules": rules}, reference)
+        ahead = theirs.difference
+        lines.append(f"- {name}: {own.hypervolume.mean:.4f}; {ahead.mean:+.4f} [{ahead.low:+.4f}, {ahead.high:+.4f}]")
+    whole = f"all rules together {theirs.hypervolume.mean:.4f}"
+    return "\n".join([f"Hypervolume up to {reference[0]:g} m, {reference[1]:g} mJ: {whole}", *lines]) + "\n"
 
 
 if __name__ == "__main__":

@@ -11,7 +11,8 @@ from tests.test_env import same
 from tests.worlds import choices, keys_of
 from wsn_env import ClusterEnv, ClusterVectorEnv, Scenario, World, bounds, make_policy
 from wsn_env.bounds import Bound, bound_kind
-from wsn_env.evaluation import Summary, episodes, evaluate, evaluation_seeds, rollout
+from wsn_env.evaluation import episodes, evaluate, evaluation_seeds, rollout
+from wsn_env.intervals import Summary
 from wsn_env.reports import draw_front, markdown_table, print_tables
 
 PLAIN = dict(particles=50)

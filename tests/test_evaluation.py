@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from wsn_env import Scenario, View, make_policy
-from wsn_env.evaluation import BLOCK, COLUMNS, Evaluation, Summary, evaluate, evaluation_seeds
+from wsn_env.evaluation import BLOCK, COLUMNS, Evaluation, evaluate, evaluation_seeds
+from wsn_env.intervals import Summary
 from wsn_env.reports import draw_front, markdown_table, print_tables, save_markdown
 
 SCENARIO = Scenario.named("PreDC-v0", particles=60, nodes=40, side_m=50.0, crossing_m=20.0, periods=8)

@@ -13,7 +13,7 @@ from agents.base import ViewPolicy
 from agents.nearest import Nearest
 from wsn_env import Scenario, ScenarioError, make_policy
 from wsn_env.cli import main
-from wsn_env.evaluation import Summary, evaluate
+from wsn_env.evaluation import evaluate
 from wsn_env.front import (
     OTHERS,
     Point,
@@ -26,6 +26,7 @@ from wsn_env.front import (
     save_front,
 )
 from wsn_env.front_report import draw_fronts
+from wsn_env.intervals import Summary
 from wsn_env.scenario import PRESETS
 
 SMALL = dict(particles=50, nodes=40, side_m=50.0, crossing_m=20.0, periods=6)

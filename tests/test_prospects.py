@@ -8,6 +8,7 @@ from wsn_env.interface import Interface, Settings
 from wsn_env.interface.actions import MENU_ENTRIES
 from wsn_env.interface.features import BELIEF_FEATURES
 from wsn_env.interface.prospects import ENTRY_FEATURES
+from wsn_env.physics.sensing import detection_probability
 
 ROWS = 4000
 ENTRIES = (0, 1, 3, 6, 10, 12, 15, 19, 22)  # as it is; head kept, moved to the best, moved ahead
@@ -82,8 +83,6 @@ def test_the_expected_sd_is_that_of_a_kalman_filter_whose_noise_is_raised_by_mis
 
 
 def promised_detection(scenario, distance):
-    from wsn_env.physics.sensing import detection_probability
-
     return detection_probability(distance, scenario.detection)
 
 

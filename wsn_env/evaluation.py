@@ -13,9 +13,9 @@ import hashlib
 import json
 import platform
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -25,6 +25,7 @@ from wsn_env import draws
 from wsn_env.bounds import Bound, bound_kind
 from wsn_env.compiling import kernels_stamp
 from wsn_env.files import replacing
+from wsn_env.intervals import Summary
 from wsn_env.policies import Policy, make_policy
 from wsn_env.progress import Progress
 from wsn_env.quantity import suggest
@@ -40,69 +41,7 @@ COLUMNS = (
     " bound_m floor_m"
 ).split()
 MEANS = ("return", "rms_m", "error_m", "energy_mj", "members", "handovers", "searches", "lost")
-RESAMPLES = 2000
 BLOCKS_FILE = "evaluation.blocks.jsonl"
-
-
-@dataclass(frozen=True)
-class Summary:
-    """Mean and 95 % bootstrap interval of one quantity, for one policy and lam."""
-
-    mean: float
-    low: float
-    high: float
-
-    @classmethod
-    def of(cls, values) -> Summary:
-        """Percentile bootstrap over episodes, with a fixed seed; no interval for a single episode."""
-        values = np.asarray(values, dtype=float)
-        if len(values) < 2 or np.ptp(values) == 0:
-            return cls(float(values.mean()), float(values.min()), float(values.max()))
-        return cls(float(values.mean()), *_middle(resampled_means(values)))
-
-    @classmethod
-    def of_root_ratio(cls, values, references) -> Summary:
-        """sqrt(mean(values) / mean(references)) of pairs, the interval as in `of`."""
-        ratio = float(np.sqrt(np.mean(values) / np.mean(references)))
-        if len(values) < 2:
-            return cls(ratio, ratio, ratio)
-        means = resampled_means(np.stack([values, references], axis=1))
-        return cls(ratio, *_middle(np.sqrt(means[:, 0] / means[:, 1])))
-
-
-def _middle(resampled) -> tuple[float, float]:
-    low, high = np.percentile(resampled, [2.5, 97.5])
-    return float(low), float(high)
-
-
-def resampled_means(values) -> np.ndarray:
-    """Means over RESAMPLES bootstrap samples of the episodes, the same for all quantities of so many episodes.
-
-    Args:
-        values: (episodes, ...).
-
-    Returns: (RESAMPLES, ...).
-    """
-    flat = np.asarray(values, float).reshape(len(values), -1)
-    means = np.concatenate([shares @ flat for shares in _shares(len(values))])
-    return means.reshape(RESAMPLES, *np.shape(values)[1:])
-
-
-def _shares(episodes: int) -> Iterable[np.ndarray]:
-    """How often each episode is in each sample, over their number, some samples at a time; kept if not too many."""
-    return _kept_shares(episodes) if episodes <= 2 * BLOCK**2 else _draw_shares(episodes)
-
-
-@lru_cache(maxsize=4)
-def _kept_shares(episodes: int) -> list[np.ndarray]:
-    return list(_draw_shares(episodes))
-
-
-def _draw_shares(episodes: int) -> Iterator[np.ndarray]:
-    rng, at_once = np.random.default_rng(0), 100
-    for _ in range(RESAMPLES // at_once):
-        drawn = rng.integers(episodes, size=(at_once, episodes)) + episodes * np.arange(at_once)[:, None]
-        yield np.bincount(drawn.ravel(), minlength=at_once * episodes).reshape(at_once, episodes) / episodes
 
 
 @dataclass(frozen=True)

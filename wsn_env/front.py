@@ -21,8 +21,9 @@ from pathlib import Path
 
 import numpy as np
 
-from wsn_env.evaluation import RESAMPLES, Evaluation, Summary, stem_of, versions
+from wsn_env.evaluation import Evaluation, stem_of, versions
 from wsn_env.files import replacing
+from wsn_env.intervals import RESAMPLES, Summary
 from wsn_env.scenario import Scenario
 
 OTHERS = "all others together"
@@ -74,7 +75,7 @@ def fronts(evaluation: Evaluation) -> Fronts:
     """Every policy's points in the order of the lams; a family's in the order of the numbers."""
     families: dict[tuple[str, bool], list[tuple[str, list[Point]]]] = {}
     for policy in evaluation.policies:
-        points = _points(evaluation, policy)
+        points = points_of(evaluation, policy)
         stem, number = numbered(policy)
         family = (stem, True) if number and len(points) == 1 else (policy, False)
         families.setdefault(family, []).append((number, points))
@@ -94,7 +95,8 @@ def numbered(policy: str) -> tuple[str, str]:
     return stem, policy[len(stem) :]
 
 
-def _points(evaluation: Evaluation, policy: str) -> list[Point]:
+def points_of(evaluation: Evaluation, policy: str) -> list[Point]:
+    """A policy's front: a point for each lam, or a single one where lam made no difference."""
     columns = [
         np.stack([evaluation.values(policy, lam, column) for column in ("error_m", "energy_mj")], axis=-1)
         for lam in evaluation.lams
@@ -149,16 +151,11 @@ def hypervolumes(fronts: Fronts, reference: tuple[float, float]) -> list[Volume]
     return [
         Volume(
             name,
-            _summary(whole[i], resampled[:, i]),
-            _summary(whole[0] - whole[i], resampled[:, 0] - resampled[:, i]) if i else None,
+            Summary.around(whole[i], resampled[:, i]),
+            Summary.around(whole[0] - whole[i], resampled[:, 0] - resampled[:, i]) if i else None,
         )
         for i, name in enumerate(fronts)
     ]
-
-
-def _summary(value: float, resampled: np.ndarray) -> Summary:
-    low, high = np.percentile(resampled, [2.5, 97.5])
-    return Summary(float(value), float(low), float(high))
 
 
 def save_front(evaluation: Evaluation, fronts: Fronts, volumes: list[Volume], out: str | Path) -> None:

@@ -1,0 +1,74 @@
+"""Bootstrap intervals over episodes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+RESAMPLES = 2000
+KEPT_EPISODES = 5000  # the resamples of more take too much memory to keep
+
+
+@dataclass(frozen=True)
+class Summary:
+    """A mean, or another figure, and its 95 % bootstrap interval."""
+
+    mean: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, values) -> Summary:
+        """Percentile bootstrap over episodes, with a fixed seed; no interval for a single episode."""
+        values = np.asarray(values, dtype=float)
+        if len(values) < 2 or np.ptp(values) == 0:
+            return cls(float(values.mean()), float(values.min()), float(values.max()))
+        return cls.around(values.mean(), resampled_means(values))
+
+    @classmethod
+    def of_root_ratio(cls, values, references) -> Summary:
+        """sqrt(mean(values) / mean(references)) of pairs, the interval as in `of`."""
+        ratio = float(np.sqrt(np.mean(values) / np.mean(references)))
+        if len(values) < 2:
+            return cls(ratio, ratio, ratio)
+        means = resampled_means(np.stack([values, references], axis=1))
+        return cls.around(ratio, np.sqrt(means[:, 0] / means[:, 1]))
+
+    @classmethod
+    def around(cls, value: float, resampled) -> Summary:
+        """A value and the middle 95 % of what resamples gave for it."""
+        low, high = np.percentile(resampled, [2.5, 97.5])
+        return cls(float(value), float(low), float(high))
+
+
+def resampled_means(values) -> np.ndarray:
+    """Means over RESAMPLES bootstrap samples of the episodes, the same for all quantities of so many episodes.
+
+    Args:
+        values: (episodes, ...).
+
+    Returns: (RESAMPLES, ...).
+    """
+    flat = np.asarray(values, float).reshape(len(values), -1)
+    means = np.concatenate([shares @ flat for shares in _shares(len(values))])
+    return means.reshape(RESAMPLES, *np.shape(values)[1:])
+
+
+def _shares(episodes: int) -> Iterable[np.ndarray]:
+    """How often each episode is in each sample, over their number, some samples at a time; kept if not too many."""
+    return _kept_shares(episodes) if episodes <= KEPT_EPISODES else _draw_shares(episodes)
+
+
+@lru_cache(maxsize=4)
+def _kept_shares(episodes: int) -> list[np.ndarray]:
+    return list(_draw_shares(episodes))
+
+
+def _draw_shares(episodes: int) -> Iterator[np.ndarray]:
+    rng, at_once = np.random.default_rng(0), 100
+    for _ in range(RESAMPLES // at_once):
+        drawn = rng.integers(episodes, size=(at_once, episodes)) + episodes * np.arange(at_once)[:, None]
+        yield np.bincount(drawn.ravel(), minlength=at_once * episodes).reshape(at_once, episodes) / episodes
