@@ -182,10 +182,15 @@ def complete(settings: Training) -> Scenario:
     if len(settings.lam) > 2:
         raise ValueError(f"train.py: lam = {settings.lam}: must be one number, or two that it is drawn between")
     if settings.order is None:
-        settings.order = "value" if scenario.binary else "nearest" if scenario.locates else "information"
+        settings.order = suited_order(scenario)
     if settings.vary is None:
         settings.vary = [f"nodes={nodes}" for nodes in other_densities(scenario)]
     return scenario.override(lam=settings.lam[0] if len(settings.lam) == 1 else tuple(settings.lam))
+
+
+def suited_order(scenario: Scenario) -> str:
+    """The menu's order of merit: by what the nodes measure."""
+    return "value" if scenario.binary else "nearest" if scenario.locates else "information"
 
 
 def other_densities(scenario: Scenario) -> list[int]:
@@ -276,6 +281,7 @@ def make_model(settings: Training, envs, folder: Path) -> PPO:
         gae_lambda=settings.gae_lambda,
         ent_coef=settings.entropy,
         policy_kwargs=shape,
+        stats_window_size=1000,  # episodes: each has a lam of its own, so that fewer would tell little
         seed=settings.seed,
         device="cpu",
     )

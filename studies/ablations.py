@@ -3,7 +3,7 @@
     python -m studies.ablations --scenario Rssi-v0 --out out/ablations
 
 Every training has a process of its own (train.py) and the same budget; a study that was stopped goes on with those that
-are missing. The policies are then compared on common held-out episodes.
+are missing. The policies are then compared on common held-out episodes, and the learning curves drawn.
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,25 +20,26 @@ import numpy as np
 import tyro
 
 from agents.ppo import PPOPolicy
-from studies.report import save_table
+from studies.report import draw_curves, save_table
+from train import suited_order
 from wsn_env.cli import make_scenario
 from wsn_env.evaluation import evaluate
+from wsn_env.interface.merit import ORDERS
 from wsn_env.progress import progress_bar
+from wsn_env.scenario import Scenario
 
 USUAL = "usual"
 DIFFERENT = {  # name: options of train.py
     USUAL: [],
     "reward: true error": ["--reward", "error"],
-    "order: nearest": ["--order", "nearest"],
-    "order: information": ["--order", "information"],
-    "order: value": ["--order", "value"],
     "action: subset": ["--action", "subset"],
-    "network: flat": ["--network", "flat", "--units", "64", "64"],
-    "network: entries of 64 x 64": ["--units", "64", "64"],
-    "discount: .8": ["--gamma", "0.8"],
-    "discount: .95": ["--gamma", "0.95"],
+    "network: flat, 64 x 64": ["--network", "flat", "--units", "64", "64"],
+    "network: entries, 64 x 64": ["--units", "64", "64"],
+    "discount: 0.9": ["--gamma", "0.9"],
+    "fields: one density": ["--vary"],
+    **{f"order: {order}": ["--order", order] for order in ORDERS},
 }
-ONE_LAM = "lam: one policy for each"
+ONE_LAM = "lam: a policy for each"
 
 
 @dataclass
@@ -46,60 +49,85 @@ class Study:
     scenario: str = "PreDC-v0"
     """Scenario id."""
     out: Path = Path("out/ablations")
-    """Folder for the runs and the table; a second call continues."""
+    """Folder for the runs, the table and the picture; a second call continues."""
     steps: int = 1_000_000
     """Periods of every training."""
-    seeds: int = 3
+    seeds: int = 5
     """Trainings of each variant."""
     episodes: int = 500
     """Held-out episodes at each lam."""
-    variants: list[str] = field(default_factory=lambda: [*DIFFERENT, ONE_LAM])
-    """Which of them."""
+    variants: list[str] = field(default_factory=list)
+    """Which of them; left out: all."""
+    workers: int = 2
+    """Trainings at a time, a core each."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One training."""
+
+    variant: str
+    seed: int
+    lam: float | None = None
+    """Its only one, or None: the whole span."""
 
 
 def main() -> int:
     """Run."""
     study = tyro.cli(Study, description=__doc__)
     scenario = make_scenario(study.scenario, [], [])
-    unknown = [name for name in study.variants if name not in (*DIFFERENT, ONE_LAM)]
+    allowed = variants(scenario)
+    unknown = [name for name in study.variants if name not in allowed]
     if unknown:
-        print(f"studies: variants {unknown} are unknown: {', '.join([*DIFFERENT, ONE_LAM])}", file=sys.stderr)
+        print(f"studies: variants {unknown} are unknown: {', '.join(allowed)}", file=sys.stderr)
         return 2
     lams = scenario.lam_octaves
     jobs = []
     for seed in range(study.seeds):
-        for name in study.variants:
-            options = DIFFERENT.get(name, [])
-            if name == ONE_LAM:
-                jobs += [(name, seed, ["--lam", f"{lam:g}"], lam) for lam in (lams[1], lams[3], lams[5])]
-            else:
-                jobs.append((name, seed, options, None))
+        for name in study.variants or allowed:
+            alone = lams[1::2] if name == ONE_LAM else [None]
+            jobs += [Job(name, seed, lam) for lam in alone]
     results: dict[str, list[dict]] = {}
-    with progress_bar() as report:
-        for i, (name, seed, options, lam) in enumerate(jobs):
-            report(i, len(jobs), f"{name}, seed {seed}")
-            folder = run(study, name, seed, options, lam)
-            results.setdefault(name, []).append(measured(study, scenario, folder, lams if lam is None else (lam,)))
+    folders: dict[str, list[Path]] = {}
+    with (
+        progress_bar() as report,
+        ThreadPoolExecutor(study.workers) as workers,
+        closing(workers.map(lambda job: run(study, job), jobs)) as trained,  # what has not begun never will
+    ):
+        for i, job in enumerate(jobs):
+            report(i, len(jobs), f"{job.variant}, seed {job.seed}")
+            folder = next(trained)
+            asked = lams if job.lam is None else (job.lam,)
+            results.setdefault(job.variant, []).append(measured(study, scenario, folder, asked))
+            if job.lam is None:
+                folders.setdefault(job.variant, []).append(folder)
     save_table(study.out, scenario, lams, results, USUAL)
+    draw_curves(folders, f"{scenario.name}: {study.seeds} trainings each", study.out / f"{scenario.name}.png")
     return 0
 
 
-def run(study: Study, name: str, seed: int, options: list[str], lam: float | None) -> Path:
-    """One training, unless it is done."""
-    word = "".join(letter if letter.isalnum() else "-" for letter in name) + (f"-{lam:g}" if lam else "")
-    folder = study.out / f"{study.scenario}-{word}-{seed}"
+def variants(scenario: Scenario) -> list[str]:
+    """What there is to try: all but the usual order of merit under its own name."""
+    return [name for name in (*DIFFERENT, ONE_LAM) if name != f"order: {suited_order(scenario)}"]
+
+
+def run(study: Study, job: Job) -> Path:
+    """Train, unless that is done."""
+    word = "".join(letter if letter.isalnum() else "-" for letter in job.variant) + (f"-{job.lam:g}" if job.lam else "")
+    folder = study.out / f"{study.scenario}-{word}-{job.seed}"
     if not (folder / "policy.json").exists():
         settings = ["--scenario", study.scenario, "--runs", str(study.out), "--name", folder.name, "--resume"]
-        settings += ["--steps", str(study.steps), "--seed", str(10**6 * seed), "--episodes", "0"]
+        settings += ["--steps", str(study.steps), "--seed", str(10**6 * job.seed), "--episodes", "0"]
+        settings += DIFFERENT.get(job.variant, ["--lam", f"{job.lam}"])
         train = Path(__file__).resolve().parents[1] / "train.py"
-        done = subprocess.run([sys.executable, str(train), *settings, *options], capture_output=True, text=True)
+        done = subprocess.run([sys.executable, str(train), *settings], capture_output=True, text=True)
         if done.returncode:
-            raise SystemExit(f"{name}: train.py failed:\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
+            raise SystemExit(f"{job.variant}: train.py failed:\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
         (folder / "said.txt").write_text(done.stdout)
     return folder
 
 
-def measured(study: Study, scenario, folder: Path, lams) -> dict[float, np.ndarray]:
+def measured(study: Study, scenario: Scenario, folder: Path, lams) -> dict[float, np.ndarray]:
     """{lam: returns (episodes,)} of a trained policy on the common held-out episodes, kept beside it."""
     path = folder / f"returns-{study.episodes}.json"
     if not path.exists():

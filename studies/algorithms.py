@@ -20,6 +20,7 @@ import tyro
 
 from agents.sb3 import SB3VecEnv
 from studies.report import save_table
+from train import suited_order
 from wsn_env.cli import make_scenario
 from wsn_env.evaluation import evaluation_seeds
 from wsn_env.scenario import Scenario
@@ -121,7 +122,7 @@ def one(study: Study, scenario: Scenario, name: str, seed: int) -> dict[float, n
     if not path.exists():
         maker, action = ALGORITHMS[name]
         span = scenario.override(lam=scenario.lam_span)
-        speaks = dict(action=action, observation="menu", order="nearest" if scenario.locates else "information")
+        speaks = dict(action=action, observation="menu", order=suited_order(scenario))
         envs = ClusterVectorEnv(ROWS, span, reward="belief", autoreset_mode="Disabled", **speaks)
         model = maker(SB3VecEnv(envs, scaled=True, stagger=True, calibrated=True), seed=10**6 * seed, device="cpu")
         started = time.perf_counter()

@@ -1,14 +1,21 @@
-"""Tables of studies: returns by lam, means over trainings, and what sets a variant apart from the usual one."""
+"""Studies for people: returns by lam over several trainings, what sets a variant apart, learning curves."""
 
 from __future__ import annotations
 
+import csv
 import json
+from collections.abc import Mapping
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
 from scipy import stats
 
 from wsn_env.files import replacing
+from wsn_env.front_report import COLOURS
+
+CURVE = "time/total_timesteps", "rollout/ep_rew_mean", "rollout/ep_len_mean"
+WORSE = 1.35  # the picture's lowest reward over its highest
 
 Returns = dict[float, np.ndarray]  # lam: (episodes,)
 
@@ -51,3 +58,50 @@ def save_table(out: Path, scenario, lams, results: dict[str, list[Returns]], usu
     for suffix, content in (("md", text), ("json", json.dumps(means, indent=1))):
         with replacing(out / f"{scenario.name}.{suffix}") as path:
             path.write_text(content)
+
+
+def learning_curve(folder: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Of a run of train.py: periods (N,), and the mean reward of the last 1,000 episodes (N,), all of them whole.
+
+    Rewards are those of the training: over the root of lam's cost, so that every lam counts alike.
+    """
+    rows = []
+    for path in sorted(folder.glob("progress-*/progress.csv"), key=lambda path: int(path.parent.name.split("-")[1])):
+        with open(path) as file:
+            rows += [[row[name] for name in CURVE] for row in csv.DictReader(file)]
+    rows = [row for row in rows if all(row)]
+    if not rows:
+        raise ValueError(f"{folder}: no progress-*/progress.csv of a training")
+    periods, rewards, lengths = np.array(rows, float).T
+    whole = lengths == lengths.max()
+    return periods[whole], rewards[whole]
+
+
+def draw_curves(folders: Mapping[str, list[Path]], title: str, path: Path) -> None:
+    """Picture of learning curves: the mean over each variant's trainings, and its 95 % interval (Student).
+
+    Args:
+        folders: {variant: runs of train.py with the same number of periods}.
+        path: a PNG file.
+    """
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(9, 5.5), layout="constrained")
+    for (name, runs), colour, line in zip(folders.items(), cycle(COLOURS), cycle(["-"] * len(COLOURS) + ["--"] * 7)):
+        curves = [learning_curve(folder) for folder in runs]
+        periods = curves[0][0]
+        rewards = np.array([np.interp(periods, *curve) for curve in curves])
+        mean, half = np.array([over_seeds(column) for column in rewards.T]).T
+        axes.plot(periods / 1e6, mean, line, color=colour, linewidth=1.3, label=name)
+        axes.fill_between(periods / 1e6, mean - half, mean + half, color=colour, alpha=0.15, linewidth=0)
+    axes.set(title=title, xlabel="periods [million]", ylabel="reward of an episode, in typical costs of a period")
+    low, high = axes.get_ylim()
+    axes.set_ylim(max(low, WORSE * high), high)
+    axes.grid(alpha=0.3, linewidth=0.5)
+    axes.legend(frameon=False, fontsize=9, loc="lower right")
+    with replacing(path) as temporary:
+        figure.savefig(temporary, dpi=140, format="png")
+    plt.close(figure)

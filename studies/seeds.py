@@ -23,6 +23,7 @@ from wsn_env.front import hypervolumes, joined, numbered, points_of, reference_p
 from wsn_env.intervals import Summary
 from wsn_env.policies import make_policy, policy_names
 from wsn_env.progress import progress_bar
+from wsn_env.scenario import Scenario
 
 SLOW = ("ppo", "planner", "all")
 
@@ -53,10 +54,7 @@ def main() -> int:
     """Run."""
     asked = tyro.cli(Comparison, description=__doc__)
     scenario = make_scenario(asked.scenario, asked.set, [])
-    trained = {}
-    for i, path in enumerate(asked.policies):
-        path = path / "policy.json" if path.is_dir() else path
-        trained[f"ppo{i}"] = PPOPolicy(scenario, path=str(path))
+    trained = load(asked.policies, scenario)
     rules = asked.rules or [name for name in policy_names() if name not in SLOW]
     policies = trained | {name: make_policy(name, scenario) for name in rules}
     lams = asked.lam or scenario.lam_octaves
@@ -73,6 +71,12 @@ def main() -> int:
     return 0
 
 
+def load(paths: list[Path], scenario: Scenario) -> dict[str, PPOPolicy]:
+    """ppo0, ppo1, ... from folders of runs, or from their policy.json."""
+    files = [path / "policy.json" if path.is_dir() else path for path in paths]
+    return {f"ppo{i}": PPOPolicy(scenario, path=str(file)) for i, file in enumerate(files)}
+
+
 def returns(evaluation: Evaluation, trained: list[str], lam: float) -> np.ndarray:
     """(trainings, episodes)."""
     return np.array([evaluation.values(name, lam, "return") for name in trained])
@@ -85,6 +89,19 @@ def families(evaluation: Evaluation, trained: list[str]) -> dict[str, list[str]]
         if name not in trained:
             found.setdefault(numbered(name)[0], []).append(name)
     return found
+
+
+def best_of(evaluation: Evaluation, names: list[str], lam: float) -> str:
+    """The one with the highest mean return, in hindsight."""
+    return max(names, key=lambda name: evaluation.values(name, lam, "return").mean())
+
+
+def ahead_of(evaluation: Evaluation, trained: list[str], rule: str, lam: float) -> str:
+    """What the trainings' mean has over a rule, in percent of the rule's return."""
+    theirs = evaluation.values(rule, lam, "return")
+    ahead = Summary.of(returns(evaluation, trained, lam).mean(axis=0) - theirs)
+    mean, low, high = (100 * value / abs(theirs.mean()) for value in (ahead.mean, ahead.low, ahead.high))
+    return f"{mean:+.1f} [{low:+.1f}, {high:+.1f}] %"
 
 
 def table(evaluation: Evaluation, trained: list[str]) -> str:
@@ -100,15 +117,10 @@ def table(evaluation: Evaluation, trained: list[str]) -> str:
     for stem, names in families(evaluation, trained).items():
         cells = []
         for lam in lams:
-            best = max(names, key=lambda name: evaluation.values(name, lam, "return").mean())
-            theirs = evaluation.values(best, lam, "return")
-            ahead = Summary.of(returns(evaluation, trained, lam).mean(axis=0) - theirs)
-            share = 100 / abs(theirs.mean())
+            best = best_of(evaluation, names, lam)
+            theirs = evaluation.values(best, lam, "return").mean()
             which = f"{numbered(best)[1]}: " if len(names) > 1 else ""
-            cells.append(
-                f"{which}{theirs.mean():.1f} ({share * ahead.mean:+.1f} [{share * ahead.low:+.1f},"
-                f" {share * ahead.high:+.1f}] %)"
-            )
+            cells.append(f"{which}{theirs:.1f} ({ahead_of(evaluation, trained, best, lam)})")
         label = f"best of {stem}0..{numbered(names[-1])[1]}" if len(names) > 1 else stem
         lines.append(f"| {label} | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from agents.ppo import PRETRAINED
-from studies import seeds
-from studies.report import over_seeds, table
+from studies import ablations, seeds, transfer
+from studies.report import draw_curves, learning_curve, over_seeds, table
+from wsn_env import Scenario
 
 SMALL = "particles=50 nodes=40 side_m=50 crossing_m=20 periods=10".split()
 
@@ -36,3 +37,50 @@ def test_a_table_gives_means_over_trainings_and_what_differs():
     lines = table([1.0, 2.0], {"usual": usual, "other": other}, "usual").splitlines()
     assert lines[2].startswith("| usual | -12.0 ± 12.7 |") and lines[2].endswith("|  |")
     assert "-13.2 ± nan (-10.0 %)" in lines[3]
+
+
+def test_other_worlds_beside_the_best_size_there(tmp_path, monkeypatch, capsys):
+    shipped = str(PRETRAINED / "Rssi-v0")
+    worlds = [" ".join(SMALL), " ".join([*SMALL, "noise_db=6"])]
+    asked = ["--scenario", "Rssi-v0", "--policies", shipped, shipped, "--worlds", *worlds]
+    asked += ["--lam", "4", "--episodes", "12", "--out", str(tmp_path)]
+    monkeypatch.setattr(sys, "argv", ["transfer", *asked])
+    assert transfer.main() == 0
+    text = (tmp_path / "Rssi-v0.md").read_text()
+    assert text.strip() in capsys.readouterr().out
+    cell = r"\| (-[\d.]+) \([+-][\d.]+ \[[+-][\d.]+, [+-][\d.]+\] %\) \|$"
+    rows = [re.search(cell, line) for line in text.splitlines()[2:]]
+    assert len(rows) == 2 and float(rows[1][1]) < float(rows[0][1])  # twice the noise, a lower return
+
+
+@pytest.mark.parametrize("name", ["PreDC-v0", "Rssi-v0"])
+def test_every_world_of_the_study_can_be_made(name):
+    scenario = Scenario.named(name)
+    made = {transfer.make_scenario(name, text.split(), []) for text in transfer.worlds_of(scenario).values()}
+    assert len(made | {scenario}) == len(transfer.worlds_of(scenario)) + 1  # and differs from all others
+
+
+def test_variants_leave_out_the_usual_order_under_another_name():
+    assert "order: nearest" not in ablations.variants(Scenario.named("PreDC-v0"))
+    assert "order: information" not in ablations.variants(Scenario.named("Rssi-v0"))
+    assert ablations.variants(Scenario.named("Rssi-v0"))[0] == ablations.USUAL
+
+
+def progress(folder, begun: int, rows: list[tuple[int, float, int]]):
+    """What train.py logs: periods, mean reward and length of the last episodes."""
+    path = folder / f"progress-{begun}" / "progress.csv"
+    path.parent.mkdir(parents=True)
+    names = "rollout/ep_len_mean,time/total_timesteps,rollout/ep_rew_mean"
+    path.write_text("\n".join([names, *(f"{length},{periods},{reward}" for periods, reward, length in rows)]))
+
+
+def test_learning_curves_join_resumed_runs_and_leave_cut_episodes_out(tmp_path):
+    progress(tmp_path / "a", 0, [(10, -3.0, 40), (20, -90.0, 100), (30, -80.0, 100)])
+    progress(tmp_path / "a", 30, [(40, -75.0, 100)])
+    progress(tmp_path / "b", 0, [(20, -92.0, 100), (40, -77.0, 100)])
+    periods, rewards = learning_curve(tmp_path / "a")
+    assert periods.tolist() == [20, 30, 40] and rewards.tolist() == [-90, -80, -75]
+    draw_curves({"usual": [tmp_path / "a", tmp_path / "b"]}, "two runs", tmp_path / "curves.png")
+    assert (tmp_path / "curves.png").stat().st_size > 10_000
+    with pytest.raises(ValueError, match="nowhere: no progress"):
+        learning_curve(tmp_path / "nowhere")
