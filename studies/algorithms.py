@@ -71,7 +71,7 @@ def usual() -> dict:
     """What the PPO kinds share with train.py."""
     from stable_baselines3.common.utils import LinearSchedule
 
-    return dict(learning_rate=LinearSchedule(2e-3, 0.0, 1.0), gamma=0.9, gae_lambda=0.9, ent_coef=5e-4)
+    return dict(learning_rate=LinearSchedule(2e-3, 0.0, 1.0), gamma=0.95, gae_lambda=0.9, ent_coef=5e-4)
 
 
 def make_sac(envs, **more):
@@ -81,7 +81,7 @@ def make_sac(envs, **more):
     return SAC(
         "MlpPolicy",
         envs,
-        gamma=0.9,
+        gamma=0.95,
         batch_size=256,
         train_freq=1,
         gradient_steps=ROWS // 16,
