@@ -38,6 +38,8 @@ class Comparison:
     """Scenario id."""
     set: list[str] = field(default_factory=list)
     """Scenario quantities, as name=value."""
+    tracks: list[Path] = field(default_factory=list)
+    """CSV files of recorded motion (columns t, x, y in s and m) instead of the scenario's."""
     lam: list[float] = field(default_factory=list)
     """Trade-offs [m/mJ]; left out: the scenario's octaves."""
     rules: list[str] = field(default_factory=list)
@@ -53,7 +55,7 @@ class Comparison:
 def main() -> int:
     """Run."""
     asked = tyro.cli(Comparison, description=__doc__)
-    scenario = make_scenario(asked.scenario, asked.set, [])
+    scenario = make_scenario(asked.scenario, asked.set, asked.tracks)
     trained = load(asked.policies, scenario)
     rules = asked.rules or [name for name in policy_names() if name not in SLOW]
     policies = trained | {name: make_policy(name, scenario) for name in rules}
