@@ -11,7 +11,6 @@ import numpy as np
 from wsn_env import draws
 from wsn_env.bounds import Bound, bound_kind
 from wsn_env.interface import Interface, Settings
-from wsn_env.interface.info import measures
 from wsn_env.interface.render import check_render_mode, frame
 from wsn_env.scenario import Scenario
 from wsn_env.types import OUTCOME, Outcome, State
@@ -24,8 +23,8 @@ class ClusterEnv(gym.Env):
 
     Args:
         scenario: an id such as "PreDC-v0", or a Scenario.
-        action: "menu" | "subset" | "nodes" | "cluster".
-        observation: "candidates" | "dict" | "view".
+        action: "menu" | "subset" | "radius" | "scores" | "nodes" | "cluster".
+        observation: "candidates" | "menu" | "dict" | "view".
         reward: "error" (the mission's) | "belief" (lower variance, for training only) | "vector" ([-error, -energy] as
             MO-Gymnasium has it, with `reward_space` and `reward_dim`).
         order: "nearest" | "information" | "value", the menu's order of merit.
@@ -76,7 +75,7 @@ class ClusterEnv(gym.Env):
         self._lam = self._state.lam.item()
         self._squares = 0.0
         self._detections = 0
-        info = self._reward_and_info(outcome)[1]
+        info = self._judge(outcome)[1]
         if self._bound is not None:
             info["bound_m"] = self._bound.begin(self._state).item()
         return self._observe(), info
@@ -89,7 +88,7 @@ class ClusterEnv(gym.Env):
             raise gym.error.ResetNeeded(f"the episode ended after {self.scenario.periods} periods: call reset()")
         cluster = self.interface.action.cluster(_batched(action), self._view)
         self._state, outcome = self.world.step(self._state, cluster, donate=True)
-        reward, info = self._reward_and_info(outcome)
+        reward, info = self._judge(outcome)
         self._squares += info["error_m"] * info["error_m"]
         self._detections += info["detections"]
         if self._bound is not None:
@@ -104,12 +103,8 @@ class ClusterEnv(gym.Env):
                     info["episode_floor_m"] = self._bound.floor_m(self._state).item()
         return self._observe(), reward, False, truncated, info
 
-    def _reward_and_info(self, outcome: Outcome) -> tuple[float | np.ndarray, dict[str, Any]]:
-        numbers = dict(zip(OUTCOME.names, outcome.row.item()))
-        reward = self.interface.reward(numbers, self._lam)
-        if self.interface.reward_space is None:
-            reward = float(reward)
-        return reward, measures(numbers, self._lam, reward)
+    def _judge(self, outcome: Outcome) -> tuple[float | np.ndarray, dict[str, Any]]:
+        return self.interface.judge(dict(zip(OUTCOME.names, outcome.row.item())), self._lam)
 
     def action_masks(self) -> np.ndarray:
         """Which entries of the action make sense now (flat bool, as sb3-contrib's MaskablePPO wants them)."""

@@ -13,10 +13,9 @@ from gymnasium.vector.utils import batch_space
 from wsn_env import draws
 from wsn_env.bounds import Bound, bound_kind
 from wsn_env.interface import Interface, Settings
-from wsn_env.interface.info import measures
 from wsn_env.interface.render import check_render_mode, frame
 from wsn_env.scenario import Scenario
-from wsn_env.types import Outcome, State
+from wsn_env.types import State
 from wsn_env.view import View
 from wsn_env.world import World
 
@@ -119,7 +118,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self._squares[rows] = 0.0
         self._detections[rows] = 0
         self._ended = self._ended & ~rows
-        info = self._reward_and_info(outcome)[1]
+        info = self.interface.judge(outcome.row, self._state.lam)[1]
         if self._bound is not None:
             info["bound_m"] = self._bound.begin(self._state, rows)
         return info
@@ -136,7 +135,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             )
         cluster = self.interface.action.cluster(_stacked(actions), self._view)
         self._state, outcome = self.world.step(self._state, cluster, donate=True)
-        reward, info = self._reward_and_info(outcome)
+        reward, info = self.interface.judge(outcome.row, self._state.lam)
         self._squares += outcome.error_m * outcome.error_m
         self._detections += outcome.detections
         if self._bound is not None:
@@ -195,10 +194,6 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             gym.logger.warn("render() needs render_mode='rgb_array' and a reset environment")
             return None
         return tuple(frame(self._state, self.scenario, row) for row in range(self.num_envs))
-
-    def _reward_and_info(self, outcome: Outcome) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        reward = self.interface.reward(outcome.row, self._state.lam)
-        return reward, measures(outcome.row, self._state.lam, reward)
 
     def _observe(self, rows: np.ndarray | None = None):
         """The observation of all rows, of which only `rows` have changed since the last."""

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from wsn_env.interface.actions import make_action
+from wsn_env.interface.info import measures
 from wsn_env.interface.observations import make_observation
 from wsn_env.interface.rewards import make_reward, reward_space
 from wsn_env.scenario import Scenario
@@ -27,5 +28,10 @@ class Interface:
         self.observation = make_observation(
             settings.observation, scenario, settings.order, settings.candidates, threads
         )
-        self.reward = make_reward(settings.reward)
         self.reward_space = reward_space(settings.reward)
+        self._reward = make_reward(settings.reward)
+
+    def judge(self, outcome, lam):
+        """A period's reward and info, of arrays (B, ...) or of one row's numbers."""
+        reward = self._reward(outcome, lam)
+        return reward, measures(outcome, lam, reward if self.reward_space is None else None)

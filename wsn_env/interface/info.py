@@ -3,8 +3,6 @@
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 TOLD = (
     "error_m",
     "energy_mj",
@@ -29,11 +27,10 @@ def measures(outcome: Mapping[str, Any], lam, reward) -> dict[str, Any]:
     Args:
         outcome: the fields of OUTCOME by name, arrays (B, ...) or the numbers of one row.
         lam: (B,) or a number.
-        reward: of the period; its two parts are told apart here. Of a vector reward, too, they are the parts of the
+        reward: of the period; its two parts are told apart here. None, of a vector reward: they are the parts of the
             mission's reward at this lam.
     """
     info = {name: outcome[name] for name in TOLD}
     info["reward_energy"] = -lam * outcome["energy_mj"]
-    vector = np.ndim(reward) > np.ndim(lam)
-    info["reward_error"] = -outcome["error_m"] if vector else reward - info["reward_energy"]
+    info["reward_error"] = -outcome["error_m"] if reward is None else reward - info["reward_energy"]
     return info
