@@ -11,7 +11,7 @@ import numpy as np
 from agents.base import ViewPolicy
 from agents.tuned import nearest_lam, tuned
 from wsn_env.compiling import kernel, piece
-from wsn_env.interface.merit import gain, mean_detection, price_mj
+from wsn_env.interface.merit import chance, gain, price_mj
 from wsn_env.physics.constants import constants
 from wsn_env.physics.field import squared_distance
 from wsn_env.physics.radio import TO_HEAD, in_one_hop, relayed, transmission
@@ -96,7 +96,7 @@ def _gather(head, chosen, positions, belief, old, awake, lam, part, nodes, c):
     chosen[:] = -1
     if head < 0:
         return 0.0
-    detection = mean_detection(positions, head, mean, cov, c)
+    detection = chance(positions, head, mean, cov, c)
     drop, q00, q01, q11 = gain(detection, positions, head, mean, cov, p00, p01, p11, c)
     total = (
         np.sqrt(p00 + p11) - np.sqrt(max(p00 + p11 - drop, 0.0)) - lam * part * _handover_mj(old, head, positions, c)
@@ -109,7 +109,7 @@ def _gather(head, chosen, positions, belief, old, awake, lam, part, nodes, c):
         node = nodes[k]
         if node < 0 or node == head or not in_one_hop(node, head, positions, c):
             continue
-        detections[k] = mean_detection(positions, node, mean, cov, c)
+        detections[k] = chance(positions, node, mean, cov, c)
         if detections[k] > LEAST_DETECTION or c.model == BINARY:  # out of reach only a bit tells
             called = _invitation_mj(node, head, old, awake, positions, c)
             prices[k] = lam * (price_mj(detections[k], positions, node, head, mean, c) + part * called)

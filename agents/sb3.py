@@ -12,6 +12,9 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from wsn_env.vector_env import ClusterVectorEnv
 
+WIDTHS = np.arange(-1.0, 4.5, 0.5)  # of beliefs, log2 of their rms over a scenario's typical error
+HARDLY_ANYTHING_M = 100.0
+
 
 class SB3VecEnv(VecEnv):
     """Steps all rows at once, bit-identical to a DummyVecEnv of single environments.
@@ -24,8 +27,8 @@ class SB3VecEnv(VecEnv):
         scaled: rewards are divided by the scenario's `typical_cost`, so that their size is alike for every scenario and
             lam.
         calibrated: the part of the reward that stands for the error is multiplied by the ratio of all true errors so
-            far to it, so that a believed error costs on average what the true one does: filters believe too little or
-            too much of themselves.
+            far to it, among beliefs about as wide, so that a believed error costs on average what the true one does:
+            filters believe too little or too much of themselves, and most where they know least.
         stagger: let the rows' first episodes end early, evenly spread, as truncations: later resets stay spread.
             Disabled mode only.
     """
@@ -43,7 +46,8 @@ class SB3VecEnv(VecEnv):
         self.seconds = 0.0  # wall time spent in step and reset
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
         self._scaled, self._calibrated = scaled, calibrated
-        self._errors = np.zeros(2)  # sums of true errors and of what the rewards took for them
+        # Sums of true errors, and of what the rewards took for them, by width; at first they agree.
+        self._errors = np.full((2, len(WIDTHS)), HARDLY_ANYTHING_M)
         self._first_end = np.full(envs.num_envs, -1)
         if stagger:
             self._first_end = 1 + np.arange(envs.num_envs) * envs.scenario.periods // envs.num_envs
@@ -94,8 +98,11 @@ class SB3VecEnv(VecEnv):
         return observation, (rewards / scale).astype(np.float32), done, infos
 
     def _calibrate(self, rewards: np.ndarray, info: dict) -> np.ndarray:
-        self._errors += info["error_m"].sum(), -info["reward_error"].sum()
-        ratio = self._errors[0] / self._errors[1] if self._errors[1] > 0 else 1.0
+        width = np.log2(np.maximum(info["posterior_rms_m"] / self.envs.scenario.typical_error_m, 1e-9))
+        nearest = abs(WIDTHS[:, None] - width).argmin(axis=0)
+        for sums, errors in zip(self._errors, (info["error_m"], -info["reward_error"])):
+            sums += np.bincount(nearest, errors, len(WIDTHS))
+        ratio = np.interp(width, WIDTHS, self._errors[0] / self._errors[1])
         return rewards + (ratio - 1.0) * info["reward_error"]
 
     def close(self) -> None:

@@ -1,7 +1,7 @@
 """python -m agents.tuning: find the hand-written rules' parameters anew, on episodes that no comparison uses.
 
 Distances are tried as shares of the sensing radius. What is best for each lam goes to agents/tuned.json. Every policy
-that is tried plays once for all lams. Some minutes for the two scenarios.
+that is tried plays once for all lams. A quarter of an hour for the two scenarios.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from wsn_env.files import replacing
 from wsn_env.policies import Policy
 from wsn_env.progress import Progress, progress_bar
 from wsn_env.scenario import Scenario
-from wsn_env.sections import Position
 from wsn_env.world import World
 
 LAMS = [0.3, 0.5, 1.0, 2.0, 4.0, 8.0, 10.0, 16.0, 30.0]
@@ -89,10 +88,6 @@ def tune(trials: Trials) -> dict:
     """What the table says of a scenario."""
     found: dict = {}
     for order in ORDERS:
-        if order == "information" and isinstance(trials.scenario.measurement, Position):
-            # Where every report tells as much in all directions the nearest tells most: the orders are the same.
-            found |= {order: found["nearest"], RULES[order]: found[RULES["nearest"]]}
-            continue
         found[order] = tune_fixed(trials, order)
         found[RULES[order]] = tune_adaptive(trials, order, found[order])
     return found | {"greedy": tune_greedy(trials)}

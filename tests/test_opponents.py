@@ -13,7 +13,8 @@ from agents.tuned import TABLE, nearest_lam
 from tests.test_policies import SCENARIO, chosen, walked
 from wsn_env import Scenario, View, World
 from wsn_env.interface.actions import MenuAction
-from wsn_env.physics.sensing import detection_probability
+from wsn_env.physics.constants import constants
+from wsn_env.physics.sensing import mean_detection
 from wsn_env.quantity import ScenarioError
 
 RSSI = Scenario.named("Rssi-v0", particles=200)
@@ -66,10 +67,12 @@ def test_the_head_stays_within_the_hysteresis(view, order):
     assert (head != view.head).sum() > 5
 
 
-def test_where_nodes_report_positions_the_orders_are_the_same(positions_view):
-    """So the table of the one serves the other."""
+def test_where_nodes_report_positions_and_the_belief_is_round_the_orders_are_the_same(positions_view):
+    """Who is most likely to detect tells most, and that is the nearest."""
+    view = View(positions_view.row, positions_view.belief.copy(), positions_view.network, positions_view.reports)
+    view.belief["predicted_cov"] = np.diag([2.0, 1.0, 2.0, 1.0])
     for hysteresis_m in (0.0, 5.0):
-        a, b = (Nearest(SCENARIO, 4, hysteresis_m, order).act(positions_view) for order in ORDERS)
+        a, b = (Nearest(SCENARIO, 4, hysteresis_m, order).act(view) for order in ORDERS)
         assert (a.head == b.head).all()
         assert all(chosen(a, row) == chosen(b, row) for row in range(40))
 
@@ -119,9 +122,16 @@ def test_each_row_takes_the_switch_of_its_own_lam(view):
 
 
 def covariance_after(p, detection):
-    """Of the position, after a report that comes with this probability: as if its noise were so much larger."""
-    r = SCENARIO.measurement.noise_m**2 / max(detection, 1e-6)
-    return p - p @ np.linalg.inv(p + r * np.eye(2)) @ p
+    """Of the position, on average over a report's coming, which has this probability, and its not coming."""
+    r = SCENARIO.measurement.noise_m**2
+    return p - detection * p @ np.linalg.inv(p + r * np.eye(2)) @ p
+
+
+def chances(scenario, view, row, nodes):
+    """Of detecting the target, under the belief."""
+    p = view.predicted_cov[row][::2, ::2]
+    offsets = view.positions[row, nodes] - view.prediction[row]
+    return np.array([mean_detection(*offset, p[0, 0], p[0, 1], p[1, 1], constants(scenario)[0]) for offset in offsets])
 
 
 def price_mj(view, row, node, head, detection, service):
@@ -133,7 +143,7 @@ def price_mj(view, row, node, head, detection, service):
     return 1e3 * (radio.sending_j(bits, far_m) + radio.receiving_j(bits))
 
 
-@pytest.mark.parametrize("lam", [0.2, 0.6, 2.0])
+@pytest.mark.parametrize("lam", [0.2, 0.6, 1.5])
 def test_greedy_takes_what_pays_and_leaves_what_does_not(positions_view, lam):
     """Each member is the best after those before it and worth its price; of the rest nobody is."""
     worth, service = 1.5, 3.0
@@ -142,8 +152,7 @@ def test_greedy_takes_what_pays_and_leaves_what_does_not(positions_view, lam):
     taken = left = 0
     for row, head in enumerate(cluster.head):
         p = view.predicted_cov[row][::2, ::2]
-        distance = np.sqrt(view.distance[row] ** 2 + np.trace(p) / 2)
-        detection = detection_probability(distance, SCENARIO.detection)
+        detection = chances(SCENARIO, view, row, range(view.positions.shape[1]))
         rest = [node for node in view.nearest(12)[0][row] if node != head and detection[node] > 1e-6]
         price = {node: price_mj(view, row, node, head, detection[node], service) for node in rest}
         p = covariance_after(p, detection[head])
@@ -169,10 +178,9 @@ def test_greedy_goes_from_many_to_the_head_alone(view, positions_view, scenario)
     assert (np.diff(counts) < 0).all()
     assert counts[0] > 6 and counts[-1] == 0
     cluster = Greedy(scenario).act(with_lam(view, 0.0))
-    spread = np.trace(view.predicted_cov[:, ::2, ::2], axis1=1, axis2=2) / 2
     for row in range(40):  # whoever can tell something, of the twelve nearest
         nodes = view.nearest(12)[0][row]
-        p = detection_probability(np.sqrt(view.distance[row, nodes] ** 2 + spread[row]), scenario.detection)
+        p = chances(scenario, view, row, nodes)
         assert chosen(cluster, row) == set(nodes[p > 1e-6].tolist()) | {int(cluster.head[row])}
 
 

@@ -8,7 +8,8 @@ from wsn_env.interface import Interface, Settings
 from wsn_env.interface.actions import MENU_ENTRIES
 from wsn_env.interface.features import BELIEF_FEATURES
 from wsn_env.interface.prospects import ENTRY_FEATURES
-from wsn_env.physics.sensing import detection_probability
+from wsn_env.physics.constants import constants
+from wsn_env.physics.sensing import mean_detection
 
 ROWS = 4000
 ENTRIES = (0, 1, 3, 6, 10, 12, 15, 19, 22)  # as it is; head kept, moved to the best, moved ahead
@@ -43,10 +44,11 @@ def possible_worlds(scenario, sd_m=0.3):
     return world, rows, interface
 
 
+@pytest.mark.parametrize("sd_m", [0.3, 5.0])
 @pytest.mark.parametrize("name", ["PreDC-v0", "Rssi-v0"])
-def test_energy_silence_and_detections_come_as_promised(name):
+def test_energy_silence_and_detections_come_as_promised(name, sd_m):
     scenario = Scenario.named(name, particles=16, resample_below=0.0, search=False, packet_success=0.8)
-    world, state, interface = possible_worlds(scenario)
+    world, state, interface = possible_worlds(scenario, sd_m)
     promised = prospects(scenario, View.of(state), "information")
     for entry in ENTRIES:
         cluster = interface.action.cluster(np.full(ROWS, entry), View.of(state))
@@ -54,17 +56,16 @@ def test_energy_silence_and_detections_come_as_promised(name):
         assert outcome.resampled.sum() == 0  # a broadcast is no part of the promise
         detections = 4 * promised["detections"][0, entry]
         energy = scenario.typical_energy_mj * promised["energy"][0, entry] ** 2
-        for values, expected in (
-            (outcome.detections, detections),
-            (outcome.energy_mj, energy),
-            (outcome.delivered == 0, promised["silence"][0, entry]),
-        ):
+        pairs = [(outcome.detections, detections), (outcome.energy_mj, energy)]
+        if sd_m < 1:  # nodes are taken to be silent independently, which they are not where the target may be far
+            pairs.append((outcome.delivered == 0, promised["silence"][0, entry]))
+        for values, expected in pairs:
             se = values.std() / ROWS**0.5
-            # Chances are those at the root mean square distance: right to a hundredth for a belief so sharp.
-            assert abs(values.mean() - expected) < 4 * se + 0.01 * abs(expected) + 1e-6, (entry, expected)
+            # Each node's chance is within .01 (rms) for such beliefs, and a cluster has up to nine.
+            assert abs(values.mean() - expected) < 4 * se + 0.03 * abs(expected) + 1e-6, (entry, expected)
 
 
-def test_the_expected_sd_is_that_of_a_kalman_filter_whose_noise_is_raised_by_missed_detections():
+def test_the_expected_sd_is_that_of_a_kalman_filter_whose_reports_may_be_missed():
     scenario = Scenario.named("PreDC-v0", lam=3.0)
     state = World(scenario, threads=1).reset([draws.key_of_seed(3)])
     promised = prospects(scenario, View.of(state))
@@ -72,18 +73,15 @@ def test_the_expected_sd_is_that_of_a_kalman_filter_whose_noise_is_raised_by_mis
     view = View.of(state)
     for n in range(9):
         after = p.copy()
-        squared = view.nearest(12)[1][0, : n + 1] ** 2 + 0.5 * np.trace(p)
-        for probability in promised_detection(scenario, np.sqrt(squared)):
-            noise = scenario.measurement.noise_m**2 / max(probability, 1e-6)
-            after = after - after @ np.linalg.inv(after + noise * np.eye(2)) @ after
+        for node in view.nearest(12)[0][0, : n + 1]:
+            offset = view.prediction[0] - view.positions[0, node]
+            chance = mean_detection(*offset, p[0, 0], p[0, 1], p[1, 1], constants(scenario)[0])
+            noise = scenario.measurement.noise_m**2 * np.eye(2)
+            after = after - chance * after @ np.linalg.inv(after + noise) @ after
         assert promised["sd"][0, 10 + n] == pytest.approx(0.5 * np.log(np.trace(after)), abs=1e-5)
         assert promised["sd_drop"][0, 10 + n] == pytest.approx(0.5 * np.log(np.trace(after) / np.trace(p)), abs=1e-5)
         mean_error = promised["error_cost"][0, 10 + n] * scenario.typical_cost(3.0)
         assert mean_error == pytest.approx(np.sqrt(np.pi * np.trace(after)) / 2, rel=3e-3)  # a round belief
-
-
-def promised_detection(scenario, distance):
-    return detection_probability(distance, scenario.detection)
 
 
 def test_a_head_ahead_holds_longer():

@@ -145,20 +145,30 @@ def test_a_fleet_is_its_parts_one_after_the_other():
         SB3Fleet([*parts(), SB3VecEnv(ClusterVectorEnv(2, action="subset", autoreset_mode="Disabled", **SMALL))])
 
 
-def test_calibrated_rewards_cost_what_the_true_errors_do():
-    """Over the periods after the first episodes; to a hundredth, where the believed errors are off by more than two."""
-    settings = dict(autoreset_mode="Disabled", lam=2.0, **SMALL)
-    true = SB3VecEnv(ClusterVectorEnv(64, **settings))
+def remember(result, infos):
+    infos.update(result[4])
+    return result
+
+
+def test_calibrated_rewards_cost_what_the_true_errors_do_among_sharp_and_wide_beliefs():
+    """Once thousands of metres of errors are known."""
+    settings = dict(scenario="Rssi-v0", nodes=81, particles=500, lam=0.0, autoreset_mode="Disabled")
     believed, calibrated = (SB3VecEnv(ClusterVectorEnv(64, reward="belief", **settings), calibrated=c) for c in (0, 1))
-    fleet, sums, rng = (true, believed, calibrated), np.zeros(3), np.random.default_rng(0)
-    for envs in fleet:
+    rng, infos = np.random.default_rng(0), {}
+    step = believed.envs.step
+    believed.envs.step = lambda actions: remember(step(actions), infos)
+    for envs in (believed, calibrated):
         envs.seed(0)
         envs.reset()
-    for period in range(8 * SMALL["periods"]):
+    true, taken, given = np.zeros(2), np.zeros(2), np.zeros(2)
+    for period in range(1500):
         actions = rng.integers(0, 28, 64)
-        rewards = [envs.step(actions)[1].sum() for envs in fleet]
-        sums += np.array(rewards) if period >= SMALL["periods"] else 0.0
-    assert abs(sums[1] / sums[0] - 1) > 0.02
-    assert sums[2] == pytest.approx(sums[0], rel=0.01)
+        rewards = [envs.step(actions)[1] for envs in (believed, calibrated)]
+        if period >= 500:
+            wide = (infos["posterior_rms_m"] > 3.0).astype(int)
+            for sums, errors in zip((true, taken, given), (infos["error_m"], -rewards[0], -rewards[1])):
+                sums += np.bincount(wide, errors, 2)
+    assert abs(np.diff(taken / true)) > 0.08  # so that one ratio for all would not do
+    assert given == pytest.approx(true, rel=0.02)
     with pytest.raises(ValueError, match="Disabled"):
         SB3VecEnv(ClusterVectorEnv(2, autoreset_mode="SameStep", **SMALL), calibrated=True)

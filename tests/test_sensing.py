@@ -57,6 +57,51 @@ def test_joint_detection_probability():
     assert sensing.joint_detection_probability([[0.0, 0.0]]) == 0
 
 
+@pytest.mark.parametrize(
+    ("changes", "within"),  # rms of the deviation over beliefs as wide as a third and as wide as a whole sensing radius
+    [
+        (dict(), (0.01, 0.03)),
+        (dict(decay=0.0), (0.02, 0.04)),  # a hard disc
+        (dict(softness=1.0, decay=0.3), (0.02, 0.03)),
+        (dict(measurement="rssi", detection="threshold", threshold_db=-65.0), (0.01, 0.03)),
+    ],
+)
+def test_mean_detection_is_that_of_targets_drawn_from_the_belief(changes, within):
+    scenario = Scenario.named("PreDC-v0", **changes)
+    c, radius, rng = constants(scenario)[0], scenario.radius_m, np.random.default_rng(0)
+    for width, rms in zip((0.3, 1.0), within):
+        deviations = []
+        for _ in range(100):
+            offset = rng.uniform(-1.5, 1.5, 2) * radius
+            root = rng.normal(size=(2, 2))
+            cov = root @ root.T
+            cov *= (width * radius * rng.uniform(0, 1)) ** 2 / np.trace(cov)
+            targets = offset + rng.normal(size=(4000, 2)) @ np.linalg.cholesky(cov).T
+            drawn = sensing.detection_probability(np.hypot(*targets.T), scenario.detection, scenario.measurement).mean()
+            deviations.append(sensing.mean_detection(*offset, cov[0, 0], cov[0, 1], cov[1, 1], c) - drawn)
+        assert np.mean(np.square(deviations)) ** 0.5 < rms  # 4,000 draws: .003 (rms)
+
+
+@pytest.mark.parametrize(
+    ("changes", "within"),
+    [(dict(), 0.03), (dict(measurement="rssi", detection="threshold", threshold_db=-65.0), 1e-6)],
+)
+def test_mean_detection_of_a_sharp_belief_is_the_probability_there(changes, within):
+    """Exactly so for a threshold; the edge of eqs. 2-3 is taken for a normal distribution function."""
+    scenario = Scenario.named("PreDC-v0", **changes)
+    for distance in np.linspace(0.5, 13.0, 101):
+        there = sensing.detection_probability(distance, scenario.detection, scenario.measurement)
+        mean = sensing.mean_detection(distance, 0.0, 1e-12, 0.0, 1e-12, constants(scenario)[0])
+        assert abs(mean - there) < within
+
+
+def test_mean_detection_tells_hopeless_nodes_apart():
+    """So that a cluster for a lost target is not made of any nodes that cannot hear it."""
+    c = constants(Scenario.named("PreDC-v0"))[0]
+    chances = [sensing.mean_detection(distance, 0.0, 1.0, 0.0, 1.0, c) for distance in np.arange(10.0, 30.0)]
+    assert (np.diff(chances) < 0).all() and chances[-1] > 0
+
+
 @numba.njit
 def measured(cs, target, positions, count):
     out = np.empty((count, 2))

@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium import spaces
 
 from wsn_env.compiling import lean_kernel
-from wsn_env.interface.merit import KEEP, ORDERS, rank_row
+from wsn_env.interface.merit import KEEP, NEAREST, ORDERS, fill_chances, rank_row
 from wsn_env.physics.constants import constants
 from wsn_env.quantity import suggest
 from wsn_env.scenario import Scenario
@@ -37,7 +37,7 @@ class MenuAction:
         actions = np.ascontiguousarray(_whole_numbers(action, self.space, rows), np.int64)
         nodes = view.nearest(self._candidates, self._ring_m)[0]
         heads, members = np.empty(rows, np.int64), np.empty((rows, GROUP), np.int32)
-        room = np.empty(nodes.shape), np.empty(nodes.shape, np.int64), np.empty(nodes.shape)
+        room = np.empty((3, *nodes.shape)), np.empty(nodes.shape, np.int64)
         seen = view.network.row, view.positions, view.row, view.belief
         if _read_menu(0, rows, self._constants, self._by, actions, nodes, *seen, *room, heads, members):
             raise _refusal(action, self.space)
@@ -60,7 +60,8 @@ def _read_menu(start, stop, cs, by, actions, nodes, standing, positions, rows, b
 
     Returns: how many actions are not in the menu.
     """
-    detections, ordered, drops, heads, members = room_and_choice
+    room, ordered, heads, members = room_and_choice
+    chances, left, drops = room[0], room[1], room[2]
     strange = 0
     for b in range(start, stop):
         action, head = actions[b], standing[b].head
@@ -69,18 +70,20 @@ def _read_menu(start, stop, cs, by, actions, nodes, standing, positions, rows, b
         if action == 0 and head >= 0:
             heads[b] = KEEP_CLUSTER
             continue
-        rule, left = (action - 1) // GROUP, (action - 1) % GROUP
+        rule, further = (action - 1) // GROUP, (action - 1) % GROUP
         if action <= 0:
-            rule, left = KEEP, 0
+            rule, further = KEEP, 0
         mean, cov, lam = beliefs[b].predicted_mean, beliefs[b].predicted_cov, rows[b].lam
-        room = detections[b], ordered[b], drops[b]
-        heads[b] = rank_row(by, rule, positions[b], head, mean, cov, lam, nodes[b], cs[0], *room)
+        if by != NEAREST:
+            fill_chances(positions[b], nodes[b], mean, cov, cs[0], chances[b])
+        given = head, mean, cov, lam, nodes[b], chances[b], cs[0]
+        heads[b] = rank_row(by, rule, positions[b], *given, left[b], ordered[b], drops[b])
         slot = 0
         for node in ordered[b]:
-            if left > 0 and node >= 0 and node != heads[b]:
+            if further > 0 and node >= 0 and node != heads[b]:
                 members[b, slot] = node
                 slot += 1
-                left -= 1
+                further -= 1
     return strange
 
 

@@ -3,10 +3,9 @@
 import numpy as np
 
 from wsn_env.compiling import lean_piece
-from wsn_env.interface.merit import gain, mean_detection
+from wsn_env.interface.merit import chance, gain
 from wsn_env.numerics import log
 from wsn_env.physics.field import squared_distance
-from wsn_env.physics.sensing import detection_piece
 
 BELIEF_FEATURES = (
     "lam",  # log, halved
@@ -26,7 +25,7 @@ BELIEF_FEATURES = (
     "head_detection",
     "head_nearest",  # 1: no living node is nearer
     "members",
-    "joint_detection",  # of the standing cluster at the prediction
+    "joint_detection",  # of the standing cluster
     "sparseness",  # distance of the ninth nearest candidate
 )
 CANDIDATE_FEATURES = (
@@ -95,22 +94,21 @@ def _describe_head(head, is_nearest, members, n, positions, m, p, ex, ey, c, f):
     f[11] = dx * ex + dy * ey
     f[12] = dy * ex - dx * ey
     f[13] = np.sqrt(dx * dx + dy * dy)
-    f[14] = mean_detection(positions, head, m, p, c)
+    f[14] = chance(positions, head, m, p, c)
     f[15] = 1.0 if is_nearest else 0.0
     f[16] = 0.25 * n
-    missed = 1.0 - detection_piece(np.sqrt(squared_distance(positions, head, m[0], m[2])), c)
+    missed = 1.0 - f[14]
     for k in range(n):
-        missed *= 1.0 - detection_piece(np.sqrt(squared_distance(positions, members[k], m[0], m[2])), c)
+        missed *= 1.0 - chance(positions, members[k], m, p, c)
     f[17] = 1.0 - missed
 
 
 @lean_piece
-def describe_candidate(node, head, members, n, positions, m, p, ex, ey, c, g):
-    """g[0:2], g[3:7], g[8]: a candidate's place, chances, role and gain."""
+def describe_candidate(node, detection, head, members, n, positions, m, p, ex, ey, c, g):
+    """g[0:2], g[3:7], g[8]: a candidate's place, its chance `detection`, role and gain."""
     dx, dy = (positions[node, 0] - m[0]) / c.radius_m, (positions[node, 1] - m[2]) / c.radius_m
     g[0] = dx * ex + dy * ey
     g[1] = dy * ex - dx * ey
-    detection = mean_detection(positions, node, m, p, c)
     g[3] = detection
     if head >= 0:
         g[4] = np.sqrt(squared_distance(positions, node, positions[head, 0], positions[head, 1])) / c.radius_m

@@ -6,7 +6,7 @@ from wsn_env.compiling import kernel, lean_piece
 from wsn_env.numerics import exp, normal_cdf
 from wsn_env.physics.field import squared_distance
 from wsn_env.physics.radio import TO_HEAD, outside, transmission
-from wsn_env.physics.sensing import BINARY, POSITION, detection_piece, strength_slope
+from wsn_env.physics.sensing import BINARY, POSITION, mean_detection, strength_slope
 
 TWO_PI = 6.283185307179586
 ORDERS = ("nearest", "information", "value")
@@ -16,46 +16,46 @@ LEAD = 0.3  # sensing radii
 
 
 @lean_piece
-def mean_detection(positions, node, mean, cov, c):
-    """Detection probability at the root mean square distance under the belief."""
-    squared = squared_distance(positions, node, mean[0], mean[2]) + 0.5 * (cov[0, 0] + cov[2, 2])
-    return detection_piece(np.sqrt(squared), c)
+def chance(positions, node, mean, cov, c):
+    """Probability that the node detects the target, under the belief."""
+    dx, dy = mean[0] - positions[node, 0], mean[2] - positions[node, 1]
+    return mean_detection(dx, dy, cov[0, 0], cov[0, 2], cov[2, 2], c)
 
 
 @lean_piece
 def gain(detection, positions, node, mean, cov, p00, p01, p11, c):
     """Expected drop of the position covariance's trace by one report of `node` [m^2], and the covariance after it.
 
-    Linearised at the prediction. That the node may not detect enters as a measurement noise of R / p.
+    Linearised at the prediction. The report comes with probability p, and with it what a report takes from the
+    covariance: the mean over both cases (Sinopoli et al., 2004, for Kalman filters with lost measurements).
 
     Args:
-        detection: its `mean_detection` p.
+        detection: its `chance` p; of no account for a binary sensor, whose silence tells as much as its report.
         p00, p01, p11: position covariance so far, after the nodes already chosen [m^2].
 
     Returns: gain, and the three entries of the covariance after.
     """
-    r = c.noise * c.noise / max(detection, 1e-6)
+    r = c.noise * c.noise
     if c.model == POSITION:
         s00, s11 = p00 + r, p11 + r
-        det = s00 * s11 - p01 * p01
-        q00 = p00 - (p00 * p00 * s11 - 2.0 * p00 * p01 * p01 + p01 * p01 * s00) / det
-        q11 = p11 - (p01 * p01 * s11 - 2.0 * p01 * p01 * p11 + p11 * p11 * s00) / det
-        q01 = p01 - (p00 * s11 * p01 - p00 * p01 * p11 - p01 * p01 * p01 + p01 * s00 * p11) / det
-        return p00 + p11 - q00 - q11, q00, q01, q11
+        share = detection / (s00 * s11 - p01 * p01)
+        c00 = share * (p00 * p00 * s11 - 2.0 * p00 * p01 * p01 + p01 * p01 * s00)
+        c11 = share * (p01 * p01 * s11 - 2.0 * p01 * p01 * p11 + p11 * p11 * s00)
+        c01 = share * (p00 * s11 * p01 - p00 * p01 * p11 - p01 * p01 * p01 + p01 * s00 * p11)
+        return c00 + c11, p00 - c00, p01 - c01, p11 - c11
     dx = mean[0] - positions[node, 0]
     dy = mean[2] - positions[node, 1]
     if c.model == BINARY:
+        detection = 1.0
         h0, h1, r = _edge(dx, dy, cov, c)
-        b0, b1 = p00 * h0 + p01 * h1, p01 * h0 + p11 * h1
-        s = h0 * b0 + h1 * b1 + r
-        return (b0 * b0 + b1 * b1) / s, p00 - b0 * b0 / s, p01 - b0 * b1 / s, p11 - b1 * b1 / s
-    # The slope of the strength, smoothed over the belief's own width.
-    squared = max(dx * dx + dy * dy + 0.5 * (cov[0, 0] + cov[2, 2]), c.floor_m * c.floor_m)
-    slope = strength_slope(squared, c)
-    h0, h1 = slope * dx, slope * dy
+    else:
+        # The slope of the strength, smoothed over the belief's own width.
+        squared = max(dx * dx + dy * dy + 0.5 * (cov[0, 0] + cov[2, 2]), c.floor_m * c.floor_m)
+        slope = strength_slope(squared, c)
+        h0, h1 = slope * dx, slope * dy
     b0, b1 = p00 * h0 + p01 * h1, p01 * h0 + p11 * h1
-    s = h0 * b0 + h1 * b1 + r
-    return (b0 * b0 + b1 * b1) / s, p00 - b0 * b0 / s, p01 - b0 * b1 / s, p11 - b1 * b1 / s
+    share = detection / (h0 * b0 + h1 * b1 + r)
+    return share * (b0 * b0 + b1 * b1), p00 - share * b0 * b0, p01 - share * b0 * b1, p11 - share * b1 * b1
 
 
 @lean_piece
@@ -97,7 +97,23 @@ def price_mj(detection, positions, node, head, mean, c):
 
 
 @lean_piece
-def order_row(positions, head, mean, cov, lam, nodes, c, detections, ordered, drops):
+def fill_chances(positions, nodes, mean, cov, c, chances):
+    """chances (K,): of the candidates `nodes`; -1: none."""
+    for k in range(len(nodes)):
+        chances[k] = chance(positions, nodes[k], mean, cov, c) if nodes[k] >= 0 else -1.0
+
+
+@lean_piece
+def known_chance(positions, node, nodes, chances, mean, cov, c):
+    """`chance` of any node; those of the candidates have been filled in."""
+    for k in range(len(nodes)):
+        if nodes[k] == node:
+            return chances[k]
+    return chance(positions, node, mean, cov, c)
+
+
+@lean_piece
+def order_row(positions, head, mean, cov, lam, nodes, chances, c, left, ordered, drops):
     """Greedy order of one row's candidates: each next one is the best after those before it, by the drop of the root of
     the position covariance's trace that it brings [m], less lam times its price.
 
@@ -105,36 +121,34 @@ def order_row(positions, head, mean, cov, lam, nodes, c, detections, ordered, dr
         head: senses anyhow and is conditioned on first; -1: none.
         mean, cov: predicted.
         lam: m/mJ; 0: by information alone.
-        nodes: (K,) candidates, -1: none.
-        detections: (K,) room for their probabilities.
+        nodes, chances: (K,) candidates, -1: none, and their `fill_chances`.
+        left: (K,) room for the chances of those still to be ordered.
         ordered: (M,) filled with the first M of them; -1 at the end where candidates are missing or are the head.
         drops: (K,) room for the drop that each brings [m].
     """
     p00, p01, p11 = cov[0, 0], cov[0, 2], cov[2, 2]
     if head >= 0:
-        detection = mean_detection(positions, head, mean, cov, c)
+        detection = known_chance(positions, head, nodes, chances, mean, cov, c)
         _, p00, p01, p11 = gain(detection, positions, head, mean, cov, p00, p01, p11, c)
     ordered[:] = -1
     drops[:] = 0.0
     for k in range(len(nodes)):
-        detections[k] = -1.0  # taken
-        if nodes[k] >= 0 and nodes[k] != head:
-            detections[k] = mean_detection(positions, nodes[k], mean, cov, c)
+        left[k] = chances[k] if nodes[k] != head else -1.0
     # Positions tell the same from everywhere: who is most likely to detect tells most.
     by_chance = c.model == POSITION and lam == 0.0
     for slot in range(len(ordered)):
         best, most, most_drop, after = -1, -np.inf, 0.0, (p00, p01, p11)
         for k in range(len(nodes)):
-            if detections[k] < 0.0 or (by_chance and detections[k] <= most):
+            if left[k] < 0.0 or (by_chance and left[k] <= most):
                 continue
             if by_chance:
-                best, most = k, detections[k]
+                best, most = k, left[k]
                 continue
-            g, q00, q01, q11 = gain(detections[k], positions, nodes[k], mean, cov, p00, p01, p11, c)
+            g, q00, q01, q11 = gain(left[k], positions, nodes[k], mean, cov, p00, p01, p11, c)
             drop = np.sqrt(p00 + p11) - np.sqrt(max(p00 + p11 - g, 0.0))
             value = drop
             if lam > 0.0:
-                value -= lam * price_mj(detections[k], positions, nodes[k], head, mean, c)
+                value -= lam * price_mj(left[k], positions, nodes[k], head, mean, c)
             if value > most:
                 best, most, most_drop, after = k, value, drop, (q00, q01, q11)
         if best < 0:
@@ -142,20 +156,21 @@ def order_row(positions, head, mean, cov, lam, nodes, c, detections, ordered, dr
         if by_chance:
             g, q00, q01, q11 = gain(most, positions, nodes[best], mean, cov, p00, p01, p11, c)
             most_drop, after = np.sqrt(p00 + p11) - np.sqrt(max(p00 + p11 - g, 0.0)), (q00, q01, q11)
-        detections[best] = -1.0
+        left[best] = -1.0
         ordered[slot] = nodes[best]
         drops[slot] = most_drop
         p00, p01, p11 = after
 
 
 @lean_piece
-def rank_row(by, rule, positions, head, mean, cov, lam, nodes, c, detections, ordered, drops):
+def rank_row(by, rule, positions, head, mean, cov, lam, nodes, chances, c, left, ordered, drops):
     """Who would lead under a rule, and the candidates in the order that they would join.
 
     Args:
         by: place in ORDERS.
         rule: KEEP: the present head, or the best if there is none; BEST: the first in the order; AHEAD: the candidate
             nearest to a point LEAD sensing radii ahead of the prediction, which the target takes longer to leave.
+        chances: not read where the nearest come first.
         The rest: as `order_row`.
 
     Returns: the leader; -1: no candidate.
@@ -170,7 +185,7 @@ def rank_row(by, rule, positions, head, mean, cov, lam, nodes, c, detections, or
             ordered[k] = nodes[k]
     else:
         price = lam if by == VALUE else 0.0
-        order_row(positions, leader, mean, cov, price, nodes, c, detections, ordered, drops)
+        order_row(positions, leader, mean, cov, price, nodes, chances, c, left, ordered, drops)
     return leader if leader >= 0 else ordered[0]
 
 
@@ -197,7 +212,8 @@ def order_by_merit(start, stop, cs, positions, heads, beliefs, lams, nodes, orde
         nodes: (B, K) candidates, -1: none.
         ordered: (B, M) filled with the first M of them.
     """
-    detections, drops = np.empty(nodes.shape[1]), np.empty(nodes.shape[1])
+    chances, left, drops = np.empty(nodes.shape[1]), np.empty(nodes.shape[1]), np.empty(nodes.shape[1])
     for b in range(start, stop):
         mean, cov = beliefs[b].predicted_mean, beliefs[b].predicted_cov
-        order_row(positions[b], heads[b], mean, cov, lams[b], nodes[b], cs[0], detections, ordered[b], drops)
+        fill_chances(positions[b], nodes[b], mean, cov, cs[0], chances)
+        order_row(positions[b], heads[b], mean, cov, lams[b], nodes[b], chances, cs[0], left, ordered[b], drops)

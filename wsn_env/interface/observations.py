@@ -16,8 +16,8 @@ from wsn_env.interface.features import (
     describe_candidate,
     describe_merit,
 )
-from wsn_env.interface.merit import ORDERS, order_row, rank_row
-from wsn_env.interface.prospects import ENTRY_FEATURES, describe_entries, describe_standing
+from wsn_env.interface.merit import ORDERS, fill_chances, order_row, rank_row
+from wsn_env.interface.prospects import ENTRY_FEATURES, describe_entries, describe_standing, foresee
 from wsn_env.physics.constants import constants
 from wsn_env.physics.field import find_candidates
 from wsn_env.quantity import suggest
@@ -37,8 +37,7 @@ def _encode_candidates(
     which,
     nodes,
     distances,
-    detections,
-    drops,
+    room,
     ordered,
     out,
     rows,
@@ -49,6 +48,7 @@ def _encode_candidates(
     """Fill out (B, n): BELIEF_FEATURES, then CANDIDATE_FEATURES of each candidate; and the candidates (B, K). Only in
     the rows marked in `which`."""
     c, network, width = cs[0], network_of(network), len(CANDIDATE_FEATURES)
+    chances, left, drops = room[0], room[1], room[2]
     for b in range(start, stop):
         if not which[b]:
             continue
@@ -58,6 +58,7 @@ def _encode_candidates(
         ex, ey = describe_belief(b, rows, beliefs, reported, network, nodes[b], distances[b], c, f[:G])
         f[G:] = 0.0
         positions, members = network.positions[b], network.members[b]
+        fill_chances(positions, nodes[b], m, p, c, chances[b])
         for k in range(nodes.shape[1]):
             node, g = nodes[b, k], f[G + k * width : G + (k + 1) * width]
             if node < 0:
@@ -65,8 +66,10 @@ def _encode_candidates(
                 continue
             g[2] = distances[b, k] / c.radius_m
             g[7] = network.battery[b, node] / battery_j
-            describe_candidate(node, standing.head, members, standing.n_members, positions, m, p, ex, ey, c, g)
-        order_row(positions, standing.head, m, p, 0.0, nodes[b], c, detections[b], ordered[b], drops[b])
+            describe_candidate(
+                node, chances[b, k], standing.head, members, standing.n_members, positions, m, p, ex, ey, c, g
+            )
+        order_row(positions, standing.head, m, p, 0.0, nodes[b], chances[b], c, left[b], ordered[b], drops[b])
         describe_merit(nodes[b], ordered[b], drops[b], np.sqrt(p[0, 0] + p[2, 2] + 1e-12), width, f[G:])
         clip(f)
 
@@ -82,8 +85,7 @@ def _encode_menu(
     which,
     nodes,
     distances,
-    detections,
-    drops,
+    room,
     ordered,
     out,
     rows,
@@ -94,6 +96,7 @@ def _encode_menu(
     """Fill out (B, n): BELIEF_FEATURES, then ENTRY_FEATURES of each of the menu's entries; the candidates (B, K).
     Only in the rows marked in `which`."""
     c, network, width = cs[0], network_of(network), len(ENTRY_FEATURES)
+    chances, left, drops, later = room[0], room[1], room[2], room[3]
     for b in range(start, stop):
         if not which[b]:
             continue
@@ -102,13 +105,15 @@ def _encode_menu(
         find_candidates(network, b, m[0], m[2], c.ring_m, nodes[b], distances[b])
         f = out[b]
         way = describe_belief(b, rows, beliefs, reported, network, nodes[b], distances[b], c, f[:G])
-        describe_standing(positions, standing, members, m, p, way, (lam, units[b], typical_mj), c, f[G : G + width])
-        room = detections[b], ordered[b], drops[b]
+        known, numbers = (nodes[b], chances[b], later[b]), (lam, units[b], typical_mj)
+        foresee(positions, known, m, p, c)
+        describe_standing(positions, standing, members, known, m, p, way, numbers, c, f[G : G + width])
         for rule in range(3):
-            leader = rank_row(by, rule, positions, standing.head, m, p, lam, nodes[b], c, *room)
+            given = standing.head, m, p, lam, nodes[b], chances[b], c
+            leader = rank_row(by, rule, positions, *given, left[b], ordered[b], drops[b])
             first = G + width + rule * GROUP * width
-            entries, numbers = f[first : first + GROUP * width], (lam, units[b], typical_mj)
-            describe_entries(positions, standing, members, ordered[b], leader, m, p, way, numbers, c, width, entries)
+            given = known, ordered[b], leader, m, p, way, numbers, c
+            describe_entries(positions, standing, members, *given, width, f[first : first + GROUP * width])
         clip(f)
 
 
@@ -143,8 +148,7 @@ class CandidatesObservation:
 
     def _run(self, kernel, numbers, out, view: View, rows):
         nodes, distances = view.nearest(self._candidates, self._ring_m)
-        merit = np.empty(nodes.shape), np.empty(nodes.shape), np.empty(nodes.shape, np.int64)
-        room = rows, nodes, distances, *merit, out
+        room = rows, nodes, distances, np.empty((4, *nodes.shape)), np.empty(nodes.shape, np.int64), out
         seen = view.row, view.belief, view.reports.count, *view.network.arrays()
         over_rows(kernel, len(rows), threads_for(rows, self._threads), self._constants, *numbers, *room, *seen)
         return out

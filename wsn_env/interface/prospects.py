@@ -3,11 +3,11 @@
 import numpy as np
 
 from wsn_env.compiling import lean_piece
-from wsn_env.interface.merit import gain, mean_detection
+from wsn_env.interface.merit import chance, fill_chances, gain, known_chance
 from wsn_env.numerics import expected_error, log
 from wsn_env.physics.field import squared_distance
 from wsn_env.physics.radio import TO_HEAD, outside, transmission
-from wsn_env.physics.sensing import detection_piece
+from wsn_env.physics.sensing import mean_detection
 
 ENTRY_FEATURES = (
     "standing",  # 1: the cluster as it is
@@ -21,7 +21,7 @@ ENTRY_FEATURES = (
     "energy",  # its root, in roots of what the scenario calls typical
     "detections",  # expected
     "silence",  # probability that no report comes
-    "hold",  # probability of a detection three periods on, at the prediction
+    "hold",  # probability of a detection AHEAD periods on, if the target keeps its velocity
     "head_ahead",  # where the head stands, in radii along and across the velocity
     "head_left",
     "head_distance",
@@ -31,11 +31,22 @@ AHEAD = 3.0  # periods
 
 
 @lean_piece
-def describe_standing(positions, standing, members, m, p, way, numbers, c, f):
+def foresee(positions, known, m, p, c):
+    """Fill in what is `known` of the candidates: (K,) nodes, -1 for none, and room (K,) for their chances of detection
+    now and AHEAD periods on."""
+    nodes, chances, later = known
+    fill_chances(positions, nodes, m, p, c, chances)
+    for k in range(len(nodes)):
+        later[k] = _chance_later(positions, nodes[k], m, p, c) if nodes[k] >= 0 else -1.0
+
+
+@lean_piece
+def describe_standing(positions, standing, members, known, m, p, way, numbers, c, f):
     """Fill f with ENTRY_FEATURES of the standing cluster.
 
     Args:
         standing, members: the row's NETWORK and its members; without a head all features but `sd` are 0.
+        known: of the candidates, by `foresee`.
         m, p: predicted mean and covariance; way: direction of its velocity.
         numbers: lam [m/mJ], the scenario's typical cost at lam [m], its typical energy [mJ].
     """
@@ -43,16 +54,16 @@ def describe_standing(positions, standing, members, m, p, way, numbers, c, f):
     f[0] = 1.0
     after, energy, sums = _begin(p), 0.0, (0.0, 1.0, 1.0)
     if standing.head >= 0:
-        after, energy, sums = _add_head(positions, standing.head, standing.head, m, p, after, sums, c)
+        after, energy, sums = _add_head(positions, standing.head, standing.head, known, m, p, after, sums, c)
         for k in range(standing.n_members):
-            after, price, sums = _add(positions, members[k], standing.head, False, m, p, after, sums, c)
+            after, price, sums = _add(positions, members[k], standing.head, False, known, m, p, after, sums, c)
             energy += price
-        _write_head(positions, standing.head, m, p, way, c, f)
+        _write_head(positions, standing.head, known, m, p, way, c, f)
     _write(standing.n_members, 0, p, after, energy, sums, numbers, f)
 
 
 @lean_piece
-def describe_entries(positions, standing, members, nodes, head, m, p, way, numbers, c, width, entries):
+def describe_entries(positions, standing, members, known, nodes, head, m, p, way, numbers, c, width, entries):
     """Fill entries (N * width,) with ENTRY_FEATURES of the head and the first n further nodes, n = 0..N - 1.
 
     Args:
@@ -62,7 +73,7 @@ def describe_entries(positions, standing, members, nodes, head, m, p, way, numbe
     old, count = standing.head, standing.n_members
     after, energy, sums = _begin(p), 0.0, (0.0, 1.0, 1.0)
     if head >= 0:
-        after, energy, sums = _add_head(positions, head, old, m, p, after, sums, c)
+        after, energy, sums = _add_head(positions, head, old, known, m, p, after, sums, c)
     slot, invited = 0, 0
     for n in range(len(entries) // width):
         f = entries[n * width : (n + 1) * width]
@@ -75,12 +86,12 @@ def describe_entries(positions, standing, members, nodes, head, m, p, way, numbe
                 slot += 1
                 awake = node == old or _among(node, members, count)
                 called = not awake or (c.receiver == TO_HEAD and head != old)  # a new head calls all of them
-                after, price, sums = _add(positions, node, head, called, m, p, after, sums, c)
+                after, price, sums = _add(positions, node, head, called, known, m, p, after, sums, c)
                 energy += price
                 invited += called
         f[1] = 1.0 if head != old else 0.0
         if head >= 0:
-            _write_head(positions, head, m, p, way, c, f)
+            _write_head(positions, head, known, m, p, way, c, f)
         _write(n, invited, p, after, energy, sums, numbers, f)
 
 
@@ -99,17 +110,36 @@ def _among(node, members, count):
 
 
 @lean_piece
-def _chances(positions, node, m, sums, detection, arrival, c):
-    """Expected detections, probability of silence, and of none three periods on, with one node more."""
-    x, y = m[0] + AHEAD * c.period_s * m[1], m[2] + AHEAD * c.period_s * m[3]
-    later = detection_piece(np.sqrt(squared_distance(positions, node, x, y)), c)
+def _chance_later(positions, node, m, p, c):
+    """Of detecting the target AHEAD periods on, if it keeps its velocity."""
+    t = AHEAD * c.period_s
+    dx, dy = m[0] + t * m[1] - positions[node, 0], m[2] + t * m[3] - positions[node, 1]
+    pxx = p[0, 0] + t * (2.0 * p[0, 1] + t * p[1, 1])
+    pxy = p[0, 2] + t * (p[0, 3] + p[1, 2] + t * p[1, 3])
+    pyy = p[2, 2] + t * (2.0 * p[2, 3] + t * p[3, 3])
+    return mean_detection(dx, dy, pxx, pxy, pyy, c)
+
+
+@lean_piece
+def _chances(positions, node, known, m, p, c):
+    """Of any node, now and AHEAD periods on."""
+    nodes, chances, later = known
+    for k in range(len(nodes)):
+        if nodes[k] == node:
+            return chances[k], later[k]
+    return chance(positions, node, m, p, c), _chance_later(positions, node, m, p, c)
+
+
+@lean_piece
+def _count(sums, detection, arrival, later):
+    """Expected detections, probability of silence, and of none AHEAD periods on, with one node more."""
     return sums[0] + detection, sums[1] * (1.0 - detection * arrival), sums[2] * (1.0 - later)
 
 
 @lean_piece
-def _add_head(positions, head, old, m, p, after, sums, c):
+def _add_head(positions, head, old, known, m, p, after, sums, c):
     """The head's own report, and the handover to it [mJ]."""
-    detection = mean_detection(positions, head, m, p, c)
+    detection, later = _chances(positions, head, known, m, p, c)
     _, p00, p01, p11 = gain(detection * c.head_delivery, positions, head, m, p, after[0], after[1], after[2], c)
     joules = c.awake_j - c.asleep_j
     if c.receiver != TO_HEAD:
@@ -118,14 +148,13 @@ def _add_head(positions, head, old, m, p, after, sums, c):
         squared = squared_distance(positions, old, positions[head, 0], positions[head, 1])
         hops = max(np.ceil(np.sqrt(squared) / c.hop_m), 1.0)
         joules += hops * (transmission(c.handover_bits, squared, c) + c.handover_bits * c.rx_j_per_bit)
-    sums = _chances(positions, head, m, sums, detection, c.head_delivery, c)
-    return (p00, p01, p11), 1e3 * joules, sums
+    return (p00, p01, p11), 1e3 * joules, _count(sums, detection, c.head_delivery, later)
 
 
 @lean_piece
-def _add(positions, node, head, called, m, p, after, sums, c):
+def _add(positions, node, head, called, known, m, p, after, sums, c):
     """A member's report, its invitation if it is called, its being awake [mJ]."""
-    detection = mean_detection(positions, node, m, p, c)
+    detection, later = _chances(positions, node, known, m, p, c)
     _, p00, p01, p11 = gain(detection * c.delivery, positions, node, m, p, after[0], after[1], after[2], c)
     joules = c.awake_j - c.asleep_j + _report_j(positions, node, head, detection, m, c)
     if called:
@@ -133,8 +162,7 @@ def _add(positions, node, head, called, m, p, after, sums, c):
         if c.receiver == TO_HEAD:
             squared = squared_distance(positions, node, positions[head, 0], positions[head, 1])
             joules += transmission(c.invitation_bits, squared, c)
-    sums = _chances(positions, node, m, sums, detection, c.delivery, c)
-    return (p00, p01, p11), 1e3 * joules, sums
+    return (p00, p01, p11), 1e3 * joules, _count(sums, detection, c.delivery, later)
 
 
 @lean_piece
@@ -150,12 +178,12 @@ def _report_j(positions, node, head, detection, m, c):
 
 
 @lean_piece
-def _write_head(positions, head, m, p, way, c, f):
+def _write_head(positions, head, known, m, p, way, c, f):
     dx, dy = (positions[head, 0] - m[0]) / c.radius_m, (positions[head, 1] - m[2]) / c.radius_m
     f[12] = dx * way[0] + dy * way[1]
     f[13] = dy * way[0] - dx * way[1]
     f[14] = np.sqrt(dx * dx + dy * dy)
-    f[15] = mean_detection(positions, head, m, p, c)
+    f[15] = known_chance(positions, head, known[0], known[1], m, p, c)
 
 
 @lean_piece

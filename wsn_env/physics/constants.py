@@ -1,11 +1,14 @@
 """A scenario as kernels see it: one record of plain numbers in SI units."""
 
 import math
+from statistics import NormalDist
 
 import numpy as np
 
 from wsn_env.scenario import Scenario
 from wsn_env.sections import RECEIVERS, Binary, Detection, Level, Measurement, Position, Threshold
+
+SHARPEST = 1e-6  # m^(2/3): an edge without width would divide by it
 
 CONSTANTS = np.dtype(
     [
@@ -20,6 +23,8 @@ CONSTANTS = np.dtype(
         ("ceiling", "f8"),
         ("decay_power", "f8"),
         ("edge_power", "f8"),
+        ("edge_root", "f8"),  # eqs. 2-3 as a normal distribution in the cube root of the squared distance
+        ("edge_width", "f8"),
         ("threshold_db", "f8"),
         # measurement: 0 position, 1 strength in dB, 2 power, 3 the same as 1 with absorption, 4 one bit
         ("model", "i8"),
@@ -120,6 +125,8 @@ def sensing_constants(detection: Detection | Threshold, measurement: Measurement
     else:
         values |= dict(inner_m=(1 - d.softness) * radius, decay=d.decay, ceiling=d.ceiling)
         values |= dict(decay_power=d.decay_power, edge_power=d.edge_power)
+        near, far = (d.distance_m(NormalDist().cdf(sds)) ** (2 / 3) for sds in (1, -1))
+        values |= dict(edge_root=(near + far) / 2, edge_width=max((far - near) / 2, SHARPEST))
     if isinstance(m, Position):
         values |= dict(noise=m.noise_m)
     elif isinstance(m, Level):

@@ -27,6 +27,16 @@ class Detection(Section):
         """From here on a node detects nothing."""
         return (1 + self.softness) * self.radius_m
 
+    def distance_m(self, share: float) -> float:
+        """Where the probability falls to a share of its ceiling (eqs. 2-3 the other way round)."""
+        inner, wanted = (1 - self.softness) * self.radius_m, -math.log(share) / max(self.decay, 1e-12)
+        near, far = inner, self.reach_m
+        for _ in range(60):  # bisection to the last bit
+            middle = (near + far) / 2
+            a1, a2 = middle - inner, self.reach_m - middle
+            near, far = (middle, far) if a1**self.decay_power < wanted * a2**self.edge_power else (near, middle)
+        return far
+
     def distances_m(self, measurement: Measurement) -> tuple[float, float]:
         """Sensing radius and reach, whatever is measured."""
         return self.radius_m, self.reach_m
