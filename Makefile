@@ -15,7 +15,7 @@ READY := $(VENV)/.ready
 train: $(READY)
 	$(RUN) train.py --resume --scenario $(SCENARIO) $(if $(LAM),--lam $(LAM))
 
-# The policies that come with the package, trained again; half an hour.
+# The policies that come with the package, trained again; 20 minutes.
 pretrained: pretrained-PreDC-v0 pretrained-Rssi-v0
 
 pretrained-PreDC-v0: STEPS := 3000000

@@ -1,7 +1,7 @@
 """python -m agents.tuning: find the hand-written rules' parameters anew, on episodes that no comparison uses.
 
 Distances are tried as shares of the sensing radius. What is best for each lam goes to agents/tuned.json. Every policy
-that is tried plays once for all lams. A quarter of an hour for the two scenarios.
+that is tried plays once for all lams. Some minutes for each scenario.
 """
 
 from __future__ import annotations

@@ -104,12 +104,19 @@ def fill_chances(positions, nodes, mean, cov, c, chances):
 
 
 @lean_piece
-def known_chance(positions, node, nodes, chances, mean, cov, c):
-    """`chance` of any node; those of the candidates have been filled in."""
+def place_of(node, nodes):
+    """Where a node stands among others; -1: nowhere."""
     for k in range(len(nodes)):
         if nodes[k] == node:
-            return chances[k]
-    return chance(positions, node, mean, cov, c)
+            return k
+    return -1
+
+
+@lean_piece
+def known_chance(positions, node, nodes, chances, mean, cov, c):
+    """`chance` of any node; those of the candidates have been filled in."""
+    k = place_of(node, nodes)
+    return chances[k] if k >= 0 else chance(positions, node, mean, cov, c)
 
 
 @lean_piece

@@ -3,7 +3,7 @@
 import numpy as np
 
 from wsn_env.compiling import lean_piece
-from wsn_env.interface.merit import chance, fill_chances, gain, known_chance
+from wsn_env.interface.merit import chance, fill_chances, gain, known_chance, place_of
 from wsn_env.numerics import expected_error, log
 from wsn_env.physics.field import squared_distance
 from wsn_env.physics.radio import TO_HEAD, outside, transmission
@@ -84,7 +84,7 @@ def describe_entries(positions, standing, members, known, nodes, head, m, p, way
             if slot < len(nodes):
                 node = nodes[slot]
                 slot += 1
-                awake = node == old or _among(node, members, count)
+                awake = node == old or place_of(node, members[:count]) >= 0
                 called = not awake or (c.receiver == TO_HEAD and head != old)  # a new head calls all of them
                 after, price, sums = _add(positions, node, head, called, known, m, p, after, sums, c)
                 energy += price
@@ -102,14 +102,6 @@ def _begin(p):
 
 
 @lean_piece
-def _among(node, members, count):
-    for k in range(count):
-        if members[k] == node:
-            return True
-    return False
-
-
-@lean_piece
 def _chance_later(positions, node, m, p, c):
     """Of detecting the target AHEAD periods on, if it keeps its velocity."""
     t = AHEAD * c.period_s
@@ -124,9 +116,9 @@ def _chance_later(positions, node, m, p, c):
 def _chances(positions, node, known, m, p, c):
     """Of any node, now and AHEAD periods on."""
     nodes, chances, later = known
-    for k in range(len(nodes)):
-        if nodes[k] == node:
-            return chances[k], later[k]
+    k = place_of(node, nodes)
+    if k >= 0:
+        return chances[k], later[k]
     return chance(positions, node, m, p, c), _chance_later(positions, node, m, p, c)
 
 

@@ -52,7 +52,7 @@ def mean_detection(dx, dy, pxx, pxy, pyy, c):
     variance += 4.0 * (dx * dx * pxx + 2.0 * dx * dy * pxy + dy * dy * pyy)
     ninth = variance / (9.0 * squared * squared)
     root = exp(log(squared) / 3.0)
-    mean = root * max(1.0 - ninth, 0.05)
+    mean = root * (1.0 - ninth)  # ninth is 2 / 9 at most
     if c.detection == THRESHOLD:
         likely = mean * mean * mean
         sds = (strength(likely, c) - c.threshold_db) / c.noise
