@@ -24,7 +24,9 @@ from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecMonitor
 
 from agents.actor_critic import EntryPolicy, network_of
+from agents.levelling import LevelledRollout
 from agents.ppo import PPOPolicy, save_policy
+from agents.recipe import other_densities, suited_level, suited_order
 from agents.sb3 import SB3Fleet, SB3VecEnv
 from wsn_env.cli import make_scenario, parse_overrides
 from wsn_env.evaluation import FIRST_SEED, evaluate, evaluation_seeds, forget_blocks, versions
@@ -58,7 +60,7 @@ class Training:
     """Scenario quantities, as name=value: nodes=400 particles=1000."""
     vary: list[str] | None = None
     """Further scenarios to train in, each this one with some quantities changed: nodes=81 motion=turns,particles=1000.
-    The rows are dealt evenly among all. Left out: two thirds and twice as many nodes, where they are drawn."""
+    The rows are dealt evenly among all. Left out: a third and twice as many nodes, where they are drawn."""
     action: str = "menu"
     """What it chooses from: menu | subset."""
     order: str | None = None
@@ -92,6 +94,9 @@ class Training:
     """Discount per period."""
     gae_lambda: float = 0.9
     """Of the generalised advantage estimate."""
+    level: float | None = None
+    """How far advantages are brought to one size, whatever the belief's width: 0: not at all; 1: wholly. Left out: by
+    what the nodes measure."""
     entropy: float = 5e-4
     """Weight of the entropy bonus."""
     network: str = "entries"
@@ -183,22 +188,11 @@ def complete(settings: Training) -> Scenario:
         raise ValueError(f"train.py: lam = {settings.lam}: must be one number, or two that it is drawn between")
     if settings.order is None:
         settings.order = suited_order(scenario)
+    if settings.level is None:
+        settings.level = suited_level(scenario)
     if settings.vary is None:
         settings.vary = [f"nodes={nodes}" for nodes in other_densities(scenario)]
     return scenario.override(lam=settings.lam[0] if len(settings.lam) == 1 else tuple(settings.lam))
-
-
-def suited_order(scenario: Scenario) -> str:
-    """The menu's order of merit: by what the nodes measure."""
-    return "value" if scenario.binary else "nearest" if scenario.locates else "information"
-
-
-def other_densities(scenario: Scenario) -> list[int]:
-    """Numbers of nodes: 150 and 450 for the 225 of PreDC-v0; none where every node has its place."""
-    if scenario.field.positions is not None:
-        return []
-    wanted = [scenario.field.nodes * share for share in (2 / 3, 2)]
-    return [round(n**0.5) ** 2 if scenario.field.layout == "grid" else round(n) for n in wanted]
 
 
 def make_envs(settings: Training, scenario: Scenario, speaks: Settings) -> SB3Fleet:
@@ -217,7 +211,7 @@ def check(settings: Training) -> None:
     """Refuse now what would fail after the training."""
     for name in "steps rows rollout batch epochs torch_threads checkpoint_steps".split():
         check_quantity("train.py", name, getattr(settings, name), at_least=1, whole=True)
-    for name in ("gamma", "gae_lambda"):
+    for name in ("gamma", "gae_lambda", "level"):
         check_quantity("train.py", name, getattr(settings, name), at_least=0, at_most=1)
     for name in ("units", "critic"):
         for units in getattr(settings, name):
@@ -281,6 +275,8 @@ def make_model(settings: Training, envs, folder: Path) -> PPO:
         gae_lambda=settings.gae_lambda,
         ent_coef=settings.entropy,
         policy_kwargs=shape,
+        rollout_buffer_class=LevelledRollout,
+        rollout_buffer_kwargs={"level": settings.level},
         stats_window_size=1000,  # episodes: each has a lam of its own, so that fewer would tell little
         seed=settings.seed,
         device="cpu",

@@ -20,8 +20,8 @@ import numpy as np
 import tyro
 
 from agents.ppo import PPOPolicy
+from agents.recipe import suited_level, suited_order
 from studies.report import draw_curves, save_table
-from train import suited_order
 from wsn_env.cli import make_scenario
 from wsn_env.evaluation import evaluate
 from wsn_env.interface.merit import ORDERS
@@ -29,6 +29,7 @@ from wsn_env.progress import progress_bar
 from wsn_env.scenario import Scenario
 
 USUAL = "usual"
+LEVELS = {0.0: "advantages: as they are", 1.0: "advantages: levelled"}
 DIFFERENT = {  # name: options of train.py
     USUAL: [],
     "reward: true error": ["--reward", "error"],
@@ -37,6 +38,7 @@ DIFFERENT = {  # name: options of train.py
     "network: entries, 64 x 64": ["--units", "64", "64"],
     "discount: 0.9": ["--gamma", "0.9"],
     "fields: one density": ["--vary"],
+    **{name: ["--level", f"{level:g}"] for level, name in LEVELS.items()},
     **{f"order: {order}": ["--order", order] for order in ORDERS},
 }
 ONE_LAM = "lam: a policy for each"
@@ -107,8 +109,9 @@ def main() -> int:
 
 
 def variants(scenario: Scenario) -> list[str]:
-    """What there is to try: all but the usual order of merit under its own name."""
-    return [name for name in (*DIFFERENT, ONE_LAM) if name != f"order: {suited_order(scenario)}"]
+    """What there is to try: all but what is usual under a name of its own."""
+    own = {f"order: {suited_order(scenario)}", LEVELS[suited_level(scenario)]}
+    return [name for name in (*DIFFERENT, ONE_LAM) if name not in own]
 
 
 def run(study: Study, job: Job) -> Path:

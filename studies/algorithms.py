@@ -18,9 +18,9 @@ import numpy as np
 import torch
 import tyro
 
+from agents.recipe import suited_order
 from agents.sb3 import SB3VecEnv
 from studies.report import save_table
-from train import suited_order
 from wsn_env.cli import make_scenario
 from wsn_env.evaluation import evaluation_seeds
 from wsn_env.scenario import Scenario

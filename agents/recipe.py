@@ -1,0 +1,24 @@
+"""What a training takes where nothing else is asked for, by scenario."""
+
+from __future__ import annotations
+
+from wsn_env.scenario import Scenario
+
+
+def suited_order(scenario: Scenario) -> str:
+    """The menu's order of merit: by what the nodes measure."""
+    return "value" if scenario.binary else "nearest" if scenario.locates else "information"
+
+
+def suited_level(scenario: Scenario) -> float:
+    """How far advantages are levelled: wholly with positions, where few tracks are lost; else what a lost one teaches
+    is needed in full."""
+    return 1.0 if scenario.locates else 0.0
+
+
+def other_densities(scenario: Scenario) -> list[int]:
+    """Numbers of nodes: 75 and 450 for the 225 of PreDC-v0; none where every node has its place."""
+    if scenario.field.positions is not None:
+        return []
+    wanted = [scenario.field.nodes * share for share in (1 / 3, 2)]
+    return [round(n**0.5) ** 2 if scenario.field.layout == "grid" else round(n) for n in wanted]
