@@ -60,7 +60,7 @@ class Training:
     """Scenario quantities, as name=value: nodes=400 particles=1000."""
     vary: list[str] | None = None
     """Further scenarios to train in, each this one with some quantities changed: nodes=81 motion=turns,particles=1000.
-    The rows are dealt evenly among all. Left out: a third and twice as many nodes, where they are drawn."""
+    The rows are dealt evenly among all. Left out: fewer and twice as many nodes, where they are drawn."""
     action: str = "menu"
     """What it chooses from: menu | subset."""
     order: str | None = None

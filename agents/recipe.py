@@ -17,8 +17,10 @@ def suited_level(scenario: Scenario) -> float:
 
 
 def other_densities(scenario: Scenario) -> list[int]:
-    """Numbers of nodes: 75 and 450 for the 225 of PreDC-v0; none where every node has its place."""
+    """Numbers of nodes: 75 and 450 for the 225 of PreDC-v0, 150 and 450 for those of Rssi-v0; none where every node has
+    its place. Sparse fields lose many tracks, which drown the rest where advantages are not levelled."""
     if scenario.field.positions is not None:
         return []
-    wanted = [scenario.field.nodes * share for share in (1 / 3, 2)]
+    fewer = 1 / 3 if suited_level(scenario) > 0.0 else 2 / 3
+    wanted = [scenario.field.nodes * share for share in (fewer, 2)]
     return [round(n**0.5) ** 2 if scenario.field.layout == "grid" else round(n) for n in wanted]
