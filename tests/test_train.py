@@ -115,12 +115,27 @@ def test_damaged_files_say_so(run, tmp_path):
         PPOPolicy(scenario, path=str(tmp_path / "none.json")).act(view)
 
 
+@pytest.mark.parametrize("asked, level", [({}, 1.0), ({"level": 0.0}, 0.0), ({"scenario": "Rssi-v0"}, 0.0)])
+def test_advantages_are_levelled_as_asked_for_or_where_nodes_measure_positions(asked, level):
+    settings = train.Training(**asked)
+    scenario = train.complete(settings)
+    speaks = train.Settings(action="menu", observation="menu", reward="belief", order=settings.order)
+    envs = train.VecMonitor(train.make_envs(settings, scenario, speaks))
+    buffer = train.make_model(settings, envs, Path("nowhere")).rollout_buffer
+    buffer.observations[0, :, :] = envs.reset()
+    buffer.rewards[0] = 1.0 + np.arange(buffer.n_envs)
+    before = buffer.rewards.copy()
+    buffer.compute_returns_and_advantage(torch.zeros(buffer.n_envs), np.ones(buffer.n_envs))
+    assert settings.level == level and (level == 0.0) == bool((buffer.advantages[0] == before[0]).all())
+
+
 @pytest.mark.parametrize(
     "bad",
     [
         dict(rollout=0),
         dict(steps=0),
         dict(gamma=2.0),
+        dict(level=1.5),
         dict(seed=2**31),
         dict(episodes=-1),
         dict(units=(0, 8)),
