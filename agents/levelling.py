@@ -16,9 +16,9 @@ LITTLE = 50.0  # transitions at the size of all: what a width counts as that was
 class LevelledRollout(RolloutBuffer):
     """Advantages brought nearer to one size, whatever the belief's width.
 
-    A choice about a lost track changes the return twenty times as much as one about a sharp belief, and nearly all of
-    that is luck: a few such periods would drown what all others tell. A factor that depends on the state alone leaves
-    every action's rank in that state as it is.
+    Advantages about a lost track are some twenty times the size of those about a sharp belief: a few such periods would
+    weigh as much as all others. A factor that depends on the state alone leaves every action's rank in that state as it
+    is.
 
     Args:
         level: advantages are divided by their root mean square among beliefs about as wide, to this power; 0: left as

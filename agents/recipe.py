@@ -11,14 +11,13 @@ def suited_order(scenario: Scenario) -> str:
 
 
 def suited_level(scenario: Scenario) -> float:
-    """How far advantages are levelled: wholly with positions, where few tracks are lost; else what a lost one teaches
-    is needed in full."""
+    """How far advantages are levelled: wholly with positions; with strengths it was tried, and did not help."""
     return 1.0 if scenario.locates else 0.0
 
 
 def other_densities(scenario: Scenario) -> list[int]:
     """Numbers of nodes: 75 and 450 for the 225 of PreDC-v0, 150 and 450 for those of Rssi-v0; none where every node has
-    its place. Sparse fields lose many tracks, which drown the rest where advantages are not levelled."""
+    its place. Sparser fields lose many tracks, and did not help where advantages are not levelled."""
     if scenario.field.positions is not None:
         return []
     fewer = 1 / 3 if suited_level(scenario) > 0.0 else 2 / 3
