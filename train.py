@@ -24,10 +24,12 @@ from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecMonitor
 
 from agents.actor_critic import EntryPolicy, network_of
+from agents.fleet import Fleet
 from agents.levelling import LevelledRollout
 from agents.ppo import PPOPolicy, save_policy
 from agents.recipe import other_densities, suited_level, suited_order
-from agents.sb3 import SB3Fleet, SB3VecEnv
+from agents.sb3 import SB3VecEnv
+from agents.training_reward import TrainingReward
 from wsn_env.cli import make_scenario, parse_overrides
 from wsn_env.evaluation import FIRST_SEED, evaluate, evaluation_seeds, forget_blocks, versions
 from wsn_env.files import replacing
@@ -195,16 +197,15 @@ def complete(settings: Training) -> Scenario:
     return scenario.override(lam=settings.lam[0] if len(settings.lam) == 1 else tuple(settings.lam))
 
 
-def make_envs(settings: Training, scenario: Scenario, speaks: Settings) -> SB3Fleet:
+def make_envs(settings: Training, scenario: Scenario, speaks: Settings) -> SB3VecEnv:
     """The rows, dealt among the scenarios."""
     scenarios = [scenario, *(scenario.override(**parse_overrides(text.split(","))) for text in settings.vary)]
     shares = np.diff(np.arange(len(scenarios) + 1) * settings.rows // len(scenarios))
-    believed = settings.reward == "belief"
     parts = []
     for one, rows in zip(scenarios, shares):
         envs = ClusterVectorEnv(int(rows), one, autoreset_mode="Disabled", **asdict(speaks))
-        parts.append(SB3VecEnv(envs, scaled=True, stagger=True, calibrated=believed))
-    return SB3Fleet(parts)
+        parts.append(TrainingReward(envs, calibrated=settings.reward == "belief"))
+    return SB3VecEnv(Fleet(parts), stagger=True)
 
 
 def check(settings: Training) -> None:

@@ -1,19 +1,14 @@
-"""The native vector environment, or several of them, as a stable-baselines3 VecEnv."""
+"""The native vector environment as a stable-baselines3 VecEnv."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecEnv
-
-from wsn_env.vector_env import ClusterVectorEnv
-
-WIDTHS = np.arange(-1.0, 4.5, 0.5)  # of beliefs, log2 of their rms over a scenario's typical error
-HARDLY_ANYTHING_M = 100.0
 
 
 class SB3VecEnv(VecEnv):
@@ -23,34 +18,29 @@ class SB3VecEnv(VecEnv):
     empty.
 
     Args:
-        envs: in same-step or disabled autoreset mode. Next-step's extra reset row is no transition: it is refused.
-        scaled: rewards are divided by the scenario's `typical_cost`, so that their size is alike for every scenario and
-            lam.
-        calibrated: the part of the reward that stands for the error is multiplied by the ratio of all true errors so
-            far to it, among beliefs about as wide, so that a believed error costs on average what the true one does:
-            filters believe too little or too much of themselves, and most where they know least.
+        envs: a ClusterVectorEnv or a Fleet, wrapped or not, in same-step or disabled autoreset mode. Next-step's extra
+            reset row is no transition: it is refused.
         stagger: let the rows' first episodes end early, evenly spread, as truncations: later resets stay spread.
             Disabled mode only.
     """
 
-    def __init__(self, envs: ClusterVectorEnv, scaled: bool = False, stagger: bool = False, calibrated: bool = False):
-        if envs.autoreset_mode == AutoresetMode.NEXT_STEP:
+    def __init__(self, envs: gym.vector.VectorEnv, stagger: bool = False):
+        self._native = envs.unwrapped
+        self._mode = self._native.autoreset_mode
+        if self._mode == AutoresetMode.NEXT_STEP:
             raise ValueError("autoreset_mode NextStep makes rows that are no transitions: use SameStep or Disabled")
-        if envs.interface.reward_space is not None:
+        if getattr(self._native, "reward_space", None) is not None:
             raise ValueError("reward 'vector': stable-baselines3 learns from one number, use 'error' or 'belief'")
-        if calibrated and envs.autoreset_mode != AutoresetMode.DISABLED:
-            raise ValueError("calibrated=True needs autoreset_mode Disabled")
-        if stagger and envs.autoreset_mode != AutoresetMode.DISABLED:
+        if stagger and self._mode != AutoresetMode.DISABLED:
             raise ValueError("stagger=True needs autoreset_mode Disabled")
         self.envs = envs
         self.seconds = 0.0  # wall time spent in step and reset
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
-        self._scaled, self._calibrated = scaled, calibrated
-        # Sums of true errors, and of what the rewards took for them, by width; at first they agree.
-        self._errors = np.full((2, len(WIDTHS)), HARDLY_ANYTHING_M)
         self._first_end = np.full(envs.num_envs, -1)
         if stagger:
-            self._first_end = 1 + np.arange(envs.num_envs) * envs.scenario.periods // envs.num_envs
+            parts = [part.unwrapped for part in getattr(self._native, "parts", [envs])]
+            ends = [1 + np.arange(part.num_envs) * part.scenario.periods // part.num_envs for part in parts]
+            self._first_end = np.concatenate(ends)
         self._steps = 0
 
     def reset(self):
@@ -76,14 +66,13 @@ class SB3VecEnv(VecEnv):
         return result
 
     def _step(self):
-        lam = self.envs.lam.copy()
         observation, rewards, terminated, truncated, info = self.envs.step(self._actions)
         self._steps += 1
         truncated = truncated | (self._first_end == self._steps)
         done = terminated | truncated
         infos: list[dict] = [{} for _ in range(self.num_envs)]
         if done.any():
-            same_step = self.envs.autoreset_mode == AutoresetMode.SAME_STEP
+            same_step = self._mode == AutoresetMode.SAME_STEP
             last = info["final_info"] if same_step else info
             for i in np.flatnonzero(done):
                 infos[i] = _row_info(last, i)
@@ -91,19 +80,8 @@ class SB3VecEnv(VecEnv):
                 infos[i]["TimeLimit.truncated"] = bool(truncated[i] and not terminated[i])
             if not same_step:
                 observation, _ = self.envs.reset(options={"reset_mask": done})
-        if self._calibrated:
-            rewards = self._calibrate(rewards, info)
-        # A copy in float32: stable-baselines3 adds the bootstrapped value in place.
-        scale = self.envs.scenario.typical_cost(lam) if self._scaled else 1.0
-        return observation, (rewards / scale).astype(np.float32), done, infos
-
-    def _calibrate(self, rewards: np.ndarray, info: dict) -> np.ndarray:
-        width = np.log2(np.maximum(info["posterior_rms_m"] / self.envs.scenario.typical_error_m, 1e-9))
-        nearest = abs(WIDTHS[:, None] - width).argmin(axis=0)
-        for sums, errors in zip(self._errors, (info["error_m"], -info["reward_error"])):
-            sums += np.bincount(nearest, errors, len(WIDTHS))
-        ratio = np.interp(width, WIDTHS, self._errors[0] / self._errors[1])
-        return rewards + (ratio - 1.0) * info["reward_error"]
+        # A copy of the rewards: stable-baselines3 adds the bootstrapped value in place.
+        return observation, rewards.astype(np.float32), done, infos
 
     def close(self) -> None:
         """Close the environments."""
@@ -111,7 +89,7 @@ class SB3VecEnv(VecEnv):
 
     def get_attr(self, attr_name: str, indices=None) -> list[Any]:
         """An attribute of the vector environment, once for each row."""
-        return [getattr(self.envs, attr_name) for _ in self._get_indices(indices)]
+        return [getattr(self._native, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices=None) -> None:
         """Refused: the rows share one environment."""
@@ -119,7 +97,7 @@ class SB3VecEnv(VecEnv):
 
     def env_method(self, method_name: str, *method_args, indices=None, **method_kwargs) -> list[Any]:
         """Call a batched method, such as action_masks(), and slice its answer."""
-        answer = getattr(self.envs, method_name)(*method_args, **method_kwargs)
+        answer = getattr(self._native, method_name)(*method_args, **method_kwargs)
         return [answer[i] for i in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class, indices=None) -> list[bool]:
@@ -128,92 +106,11 @@ class SB3VecEnv(VecEnv):
 
     def has_attr(self, attr_name: str) -> bool:
         """Whether the vector environment has the attribute."""
-        return hasattr(self.envs, attr_name)
+        return hasattr(self._native, attr_name)
 
     def get_images(self):
         """Frames of all rows."""
         return self.envs.render()
-
-
-class SB3Fleet(VecEnv):
-    """Several SB3VecEnv as one, their rows one after the other: a training meets many scenarios at once.
-
-    Args:
-        parts: of the same spaces.
-    """
-
-    def __init__(self, parts: Sequence[SB3VecEnv]):
-        first = parts[0]
-        for part in parts:
-            if (part.observation_space, part.action_space) != (first.observation_space, first.action_space):
-                raise ValueError(
-                    f"spaces differ: {part.observation_space}, {part.action_space} of {part.envs.scenario.name} and"
-                    f" {first.observation_space}, {first.action_space}"
-                )
-        self.parts = list(parts)
-        super().__init__(sum(part.num_envs for part in parts), first.observation_space, first.action_space)
-        self._ends = np.cumsum([part.num_envs for part in parts])
-
-    @property
-    def seconds(self) -> float:
-        """Wall time spent in step and reset."""
-        return sum(part.seconds for part in self.parts)
-
-    def seed(self, seed: int | None = None):
-        """Row i of all gets seed + i."""
-        starts = [0, *self._ends[:-1]]
-        return [
-            one for part, at in zip(self.parts, starts) for one in part.seed(None if seed is None else seed + int(at))
-        ]
-
-    def reset(self):
-        """New episodes in all rows."""
-        observations = [part.reset() for part in self.parts]
-        self.reset_infos = [info for part in self.parts for info in part.reset_infos]
-        return np.concatenate(observations)
-
-    def step_async(self, actions) -> None:
-        """Remember the actions."""
-        for part, own in zip(self.parts, np.split(actions, self._ends[:-1])):
-            part.step_async(own)
-
-    def step_wait(self):
-        """One period of every part."""
-        observations, rewards, dones, infos = zip(*(part.step_wait() for part in self.parts))
-        return np.concatenate(observations), np.concatenate(rewards), np.concatenate(dones), sum(infos, [])
-
-    def close(self) -> None:
-        """Close all."""
-        for part in self.parts:
-            part.close()
-
-    def get_attr(self, attr_name: str, indices=None) -> list[Any]:
-        """An attribute of the parts, once for each row."""
-        values = [value for part in self.parts for value in part.get_attr(attr_name)]
-        return [values[i] for i in self._get_indices(indices)]
-
-    def set_attr(self, attr_name: str, value: Any, indices=None) -> None:
-        """Refused, as by the parts."""
-        self.parts[0].set_attr(attr_name, value)
-
-    def env_method(self, method_name: str, *method_args, indices=None, **method_kwargs) -> list[Any]:
-        """Call a batched method of every part, and slice the answers."""
-        answers = [
-            answer for part in self.parts for answer in part.env_method(method_name, *method_args, **method_kwargs)
-        ]
-        return [answers[i] for i in self._get_indices(indices)]
-
-    def env_is_wrapped(self, wrapper_class, indices=None) -> list[bool]:
-        """Rows are never wrapped one by one."""
-        return [False for _ in self._get_indices(indices)]
-
-    def has_attr(self, attr_name: str) -> bool:
-        """Whether the parts have the attribute."""
-        return self.parts[0].has_attr(attr_name)
-
-    def get_images(self):
-        """Frames of all rows."""
-        return [image for part in self.parts for image in part.get_images()]
 
 
 def _row(arrays, i: int):

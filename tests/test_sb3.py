@@ -4,12 +4,15 @@ import itertools
 
 import numpy as np
 import pytest
+from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import DummyVecEnv, VecFrameStack
 
 from agents.base import ViewPolicy
-from agents.sb3 import SB3Fleet, SB3VecEnv
+from agents.fleet import Fleet
+from agents.sb3 import SB3VecEnv
+from agents.training_reward import TrainingReward
 from tests.test_env import same
 from wsn_env import Cluster, ClusterEnv, ClusterVectorEnv, Scenario, make_policy
 from wsn_env.evaluation import evaluate
@@ -67,7 +70,7 @@ def test_staggered_rows_end_at_different_times():
 def test_scaled_rewards_and_wrappers():
     rows = 3
     plain = SB3VecEnv(ClusterVectorEnv(rows, lam=4.0, autoreset_mode="SameStep", **SMALL))
-    scaled = SB3VecEnv(ClusterVectorEnv(rows, lam=4.0, autoreset_mode="SameStep", **SMALL), scaled=True)
+    scaled = SB3VecEnv(TrainingReward(ClusterVectorEnv(rows, lam=4.0, autoreset_mode="SameStep", **SMALL)))
     stacked = VecFrameStack(SB3VecEnv(ClusterVectorEnv(rows, autoreset_mode="SameStep", **SMALL)), 2)
     for envs in (plain, scaled, stacked):
         envs.seed(0)
@@ -120,29 +123,51 @@ def test_predict_keeps_the_head_where_a_policy_says_so():
         observation, *_ = env.step({"head": order[5], "members": np.zeros(30, int)})
 
 
-def test_a_fleet_is_its_parts_one_after_the_other():
-    def parts():
-        scenarios = [dict(SMALL, nodes=20), SMALL]
-        settings = dict(autoreset_mode="Disabled", lam=(0.5, 8.0))
-        return [SB3VecEnv(ClusterVectorEnv(3 + i, **settings, **one)) for i, one in enumerate(scenarios)]
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+@pytest.mark.parametrize("observation", ("candidates", "dict"))
+def test_a_fleet_is_its_parts_one_after_the_other(mode, observation):
+    """Of other horizons: rows end at different times."""
 
-    fleet, alone = SB3Fleet(parts()), parts()
-    fleet.seed(5)
-    alone[0].seed(5), alone[1].seed(5 + 3)
-    assert same(fleet.reset(), np.concatenate([part.reset() for part in alone]))
+    def parts():
+        scenarios = [dict(SMALL, nodes=20, periods=5), SMALL]
+        settings = dict(autoreset_mode=mode, observation=observation, lam=(0.5, 8.0))
+        return [ClusterVectorEnv(3 + i, **settings, **one) for i, one in enumerate(scenarios)]
+
+    fleet, alone = Fleet(parts()), parts()
+    ours, theirs = fleet.reset(seed=5), [alone[0].reset(seed=5), alone[1].reset(seed=5 + 3)]
     rng = np.random.default_rng(0)
     for _ in range(30):
         actions = rng.integers(0, 28, 7)
-        observation, reward, done, infos = fleet.step(actions)
-        theirs = alone[0].step(actions[:3]), alone[1].step(actions[3:])
-        for i, ours in enumerate((observation, reward, done)):
-            assert same(ours, np.concatenate([their[i] for their in theirs]))
-        assert all(map(same, infos, theirs[0][3] + theirs[1][3]))
-    masks = np.array(fleet.env_method("action_masks"))
-    assert masks.shape == (7, 28) and fleet.has_attr("action_masks")
-    assert fleet.get_attr("lam", indices=[6])[0].shape == (4,)
-    with pytest.raises(ValueError, match="spaces differ"):
-        SB3Fleet([*parts(), SB3VecEnv(ClusterVectorEnv(2, action="subset", autoreset_mode="Disabled", **SMALL))])
+        ours, theirs = fleet.step(actions), (alone[0].step(actions[:3]), alone[1].step(actions[3:]))
+        for rows, part in ((slice(0, 3), theirs[0]), (slice(3, 7), theirs[1])):
+            assert same(of_rows(ours[0], rows), part[0])
+            assert all(same(ours[i][rows], part[i]) for i in (1, 2, 3))
+            for name, value in ours[4].items():
+                if name == "final_info":
+                    found = part[4].get(name, {})
+                    assert all(same(value[each][rows], found[each]) for each in found)
+                elif name in part[4]:
+                    assert same(value[rows], part[4][name])
+                elif name.startswith("_"):
+                    assert not value[rows].any()
+        if mode == AutoresetMode.DISABLED and ours[3].any():
+            mask = ours[3]
+            begun = fleet.reset(options={"reset_mask": mask})[0]
+            for rows, part in ((slice(0, 3), alone[0]), (slice(3, 7), alone[1])):
+                if mask[rows].any():
+                    assert same(of_rows(begun, rows), part.reset(options={"reset_mask": mask[rows]})[0])
+    assert fleet.action_masks().shape == (7, 28) and fleet.lam.shape == (7,)
+    other = ClusterVectorEnv(2, action="subset", observation=observation, autoreset_mode=mode, lam=(0.5, 8.0), **SMALL)
+    with pytest.raises(ValueError, match="single_action_space.*differs"):
+        Fleet([*parts(), other])
+
+
+def of_rows(observation, rows):
+    return (
+        {name: of_rows(value, rows) for name, value in observation.items()}
+        if isinstance(observation, dict)
+        else observation[rows]
+    )
 
 
 def remember(result, infos):
@@ -153,7 +178,8 @@ def remember(result, infos):
 def test_calibrated_rewards_cost_what_the_true_errors_do_among_sharp_and_wide_beliefs():
     """Once thousands of metres of errors are known."""
     settings = dict(scenario="Rssi-v0", nodes=81, particles=500, lam=0.0, autoreset_mode="Disabled")
-    believed, calibrated = (SB3VecEnv(ClusterVectorEnv(64, reward="belief", **settings), calibrated=c) for c in (0, 1))
+    envs = [ClusterVectorEnv(64, reward="belief", **settings) for _ in range(2)]
+    believed, calibrated = SB3VecEnv(envs[0]), SB3VecEnv(TrainingReward(envs[1], calibrated=True))
     rng, infos = np.random.default_rng(0), {}
     step = believed.envs.step
     believed.envs.step = lambda actions: remember(step(actions), infos)
@@ -171,4 +197,4 @@ def test_calibrated_rewards_cost_what_the_true_errors_do_among_sharp_and_wide_be
     assert abs(np.diff(taken / true)) > 0.08  # so that one ratio for all would not do
     assert given == pytest.approx(true, rel=0.02)
     with pytest.raises(ValueError, match="Disabled"):
-        SB3VecEnv(ClusterVectorEnv(2, autoreset_mode="SameStep", **SMALL), calibrated=True)
+        TrainingReward(ClusterVectorEnv(2, autoreset_mode="SameStep", **SMALL), calibrated=True)
