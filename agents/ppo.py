@@ -37,6 +37,11 @@ class PPOPolicy(ViewPolicy):
         weights = b"".join(array.tobytes() for array in self._parts[1].arrays.values())
         return f"PPOPolicy({self.path!r}, weights {hashlib.sha256(weights).hexdigest()[:16]})"
 
+    def __getstate__(self):
+        """It takes its network along to machines that lack the file."""
+        assert self._parts
+        return self.__dict__
+
     @cached_property
     def _parts(self) -> tuple[Interface, Network]:
         path = Path(self.path or PRETRAINED / self.scenario.name / "policy.json")

@@ -20,10 +20,11 @@ import tyro
 
 from agents.recipe import suited_order
 from agents.sb3 import SB3VecEnv
+from agents.training_reward import TrainingReward
 from studies.report import save_table
 from wsn_env.cli import make_scenario
-from wsn_env.evaluation import evaluation_seeds
 from wsn_env.scenario import Scenario
+from wsn_env.scoring import score
 from wsn_env.vector_env import ClusterVectorEnv
 
 ROWS = 256
@@ -124,7 +125,7 @@ def one(study: Study, scenario: Scenario, name: str, seed: int) -> dict[float, n
         span = scenario.override(lam=scenario.lam_span)
         speaks = dict(action=action, observation="menu", order=suited_order(scenario))
         envs = ClusterVectorEnv(ROWS, span, reward="belief", autoreset_mode="Disabled", **speaks)
-        model = maker(SB3VecEnv(envs, scaled=True, stagger=True, calibrated=True), seed=10**6 * seed, device="cpu")
+        model = maker(SB3VecEnv(TrainingReward(envs, calibrated=True), stagger=True), seed=10**6 * seed, device="cpu")
         started = time.perf_counter()
         model.learn(study.steps)
         seconds = time.perf_counter() - started
@@ -142,15 +143,17 @@ def one(study: Study, scenario: Scenario, name: str, seed: int) -> dict[float, n
 def play(model, scenario: Scenario, speaks: dict, episodes: int) -> np.ndarray:
     """Returns (episodes,) of the model's likeliest actions on the held-out episodes, by the true error."""
     envs = ClusterVectorEnv(episodes, scenario, autoreset_mode="Disabled", **speaks)
-    observation, _ = envs.reset(seed=evaluation_seeds(1, episodes))
-    total, memory, first = np.zeros(episodes), None, np.ones(episodes, bool)
-    for _ in range(scenario.periods):
-        masks = {"action_masks": envs.action_masks()} if type(model).__name__ == "MaskablePPO" else {}
-        actions, memory = model.predict(observation, memory, first, deterministic=True, **masks)
-        observation, reward, *_ = envs.step(actions)
-        total += reward
+    masked = type(model).__name__ == "MaskablePPO"
+    memory, first = None, np.ones(episodes, bool)
+
+    def act(observations):
+        nonlocal memory
+        masks = {"action_masks": envs.action_masks()} if masked else {}
+        actions, memory = model.predict(observations, memory, first, deterministic=True, **masks)
         first[:] = False
-    return total
+        return actions
+
+    return score(act, envs, seed=1)
 
 
 if __name__ == "__main__":

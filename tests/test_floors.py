@@ -36,6 +36,8 @@ FLOORS = {
     "agents.planner": 7,  # it rehearses and compares
     "agents.sb3": 7,  # adapts the vector environment
     "wsn_env.evaluation": 7,
+    "wsn_env.scoring": 7,
+    "wsn_env.ray_engine": 7,
     "wsn_env.reports": 7,
     "wsn_env.front": 7,
     "wsn_env.front_report": 7,

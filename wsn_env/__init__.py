@@ -22,6 +22,7 @@ _HOMES = {
     "ClusterEnv": "wsn_env.env",
     "ClusterVectorEnv": "wsn_env.vector_env",
     "evaluate": "wsn_env.evaluation",
+    "score": "wsn_env.scoring",
     "make_policy": "wsn_env.policies",
     "register_envs": "wsn_env.registration",
 }

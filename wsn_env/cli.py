@@ -6,7 +6,7 @@ import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
@@ -37,8 +37,12 @@ class Evaluate:
     """CSV files of recorded motion (t, x, y in s and m) instead of the scenario's motion."""
     set: list[str] = field(default_factory=list)
     """Scenario quantities, as name=value: nodes=400 particles=1000 tracker=ekf."""
+    engine: Literal["local", "ray"] = "local"
+    """Where the episodes are played: in this process, or as tasks of a Ray cluster. The rows are the same."""
+    address: str | None = None
+    """Of a running Ray cluster, such as auto or ray://HOST:10001; left out: one on this machine."""
     out: Path | None = None
-    """Folder for the files; left out: only the table."""
+    """Folder for the files; left out: only the table. A run that was stopped continues from it."""
 
 
 @dataclass
@@ -80,8 +84,11 @@ def run_evaluate(command: Evaluate) -> None:
     from wsn_env.evaluation import evaluate, forget_blocks
     from wsn_env.front import check_front_libraries, lam_sweep
     from wsn_env.front_report import FRONT_FILES, report_front
+    from wsn_env.ray_engine import on_ray
     from wsn_env.reports import print_tables, save_markdown
 
+    if command.address and command.engine != "ray":
+        raise ValueError(f"--address {command.address}: only with --engine ray")
     scenario = make_scenario(command.scenario, command.set, command.tracks)
     lams = command.lam
     if command.pareto:
@@ -96,6 +103,7 @@ def run_evaluate(command: Evaluate) -> None:
             command.seed,
             keep=command.out,
             progress=report,
+            engine=on_ray(command.address) if command.engine == "ray" else None,
         )
     if command.pareto:
         report_front(evaluation, command.out)

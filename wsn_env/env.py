@@ -106,11 +106,16 @@ class ClusterEnv(gym.Env):
     def _judge(self, outcome: Outcome) -> tuple[float | np.ndarray, dict[str, Any]]:
         return self.interface.judge(dict(zip(OUTCOME.names, outcome.row.item())), self._lam)
 
+    @property
+    def view(self) -> View:
+        """What hand-written policies see now: `policy.act(env.view)` is their choice, whatever the action space."""
+        if self._view is None:
+            raise gym.error.ResetNeeded("call reset() first")
+        return self._view
+
     def action_masks(self) -> np.ndarray:
         """Which entries of the action make sense now (flat bool, as sb3-contrib's MaskablePPO wants them)."""
-        if self._view is None:
-            raise gym.error.ResetNeeded("call reset() before action_masks()")
-        return self.interface.action.masks(self._view)[0]
+        return self.interface.action.masks(self.view)[0]
 
     def render(self):
         """A frame (H, W, 3) uint8 of the present state."""

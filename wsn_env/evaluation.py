@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -213,6 +214,39 @@ def at_lam(measured: Sequence[dict], lam: float) -> list[dict]:
     ]
 
 
+class Block(NamedTuple):
+    """Up to BLOCK episodes of a policy: what an engine plays at a time."""
+
+    name: str
+    lam: float | None  # that the policy sees; None: it does not look, and this serves all
+    number: int
+    policy: Policy
+    scenario: Scenario
+    seeds: list[int]
+
+
+Engine = Callable[
+    [Sequence[Block]], Iterator[tuple[Block, list[dict]]]
+]  # each with what `rollout` measured, as it comes
+
+
+def in_this_process(threads: int | None = None) -> Engine:
+    """Plays the blocks one after the other.
+
+    Args:
+        threads: as World's.
+    """
+
+    def play(blocks):
+        world = None
+        for block in blocks:
+            if world is None or world.scenario is not block.scenario:
+                world = World(block.scenario, threads)
+            yield block, rollout(block.policy, world, block.seeds)
+
+    return play
+
+
 def evaluate(
     policies: Sequence[str] | dict[str, Policy],
     scenario: Scenario,
@@ -222,6 +256,7 @@ def evaluate(
     keep: str | Path | None = None,
     progress: Progress | None = None,
     threads: int | None = None,
+    engine: Engine | None = None,
 ) -> Evaluation:
     """Paired comparison of policies.
 
@@ -235,6 +270,7 @@ def evaluate(
         keep: a folder for finished blocks, so that a stopped run continues; None: none are kept.
         progress: called with (blocks done, of, what).
         threads: as World's.
+        engine: where the blocks are played; None: in this process. The rows do not depend on it.
 
     Raises:
         ValueError: for an unknown policy, or seed and episodes out of range.
@@ -246,30 +282,28 @@ def evaluate(
         raise ValueError("policies and lams must name at least one each")
     named = policies if isinstance(policies, dict) else dict(_made(text, scenario) for text in policies)
     seeds = evaluation_seeds(seed, episodes)
-    blocks = [seeds[i : i + BLOCK] for i in range(0, episodes, BLOCK)]
     kept = _Kept(keep, _settings(scenario, named, lams, episodes, seed), list(named.values()))
-    rows: list[dict] = []
-    done, total = 0, len(lams) * len(named) * len(blocks)
+    blocks: dict[tuple, Block] = {}
     for lam in lams:
-        world = World(scenario.override(lam=lam), threads)
+        at_this = scenario.override(lam=lam)
         for name, policy in named.items():
-            for number, block in enumerate(blocks):
-                played_at = lam if getattr(policy, "sees_lam", True) else None  # None: for all
-                measured = kept.get(name, played_at, number, len(block))
-                if measured is None:
-                    measured = kept.put(name, played_at, number, rollout(policy, world, block))
-                for i, values in enumerate(at_lam(measured, lam)):
-                    episode = number * BLOCK + i
-                    row = {
-                        "policy": name,
-                        "scenario": scenario.name,
-                        "episode": episode,
-                        "seed": block[i],
-                    }
-                    rows.append({column: (row | values)[column] for column in COLUMNS})
-                done += 1
-                if progress:
-                    progress(done, total, f"{name}, lam {lam:g}")
+            seen = lam if getattr(policy, "sees_lam", True) else None
+            for number in range(-(-episodes // BLOCK)):
+                own = seeds[number * BLOCK : (number + 1) * BLOCK]
+                blocks.setdefault((name, seen, number), Block(name, seen, number, policy, at_this, own))
+    missing = [block for block in blocks.values() if not kept.has(block)]
+    for done, (block, measured) in enumerate((engine or in_this_process(threads))(missing), len(blocks) - len(missing)):
+        kept.put(block, measured)
+        if progress:
+            progress(done + 1, len(blocks), block.name if block.lam is None else f"{block.name}, lam {block.lam:g}")
+    rows = []
+    for lam in lams:
+        for name, policy in named.items():
+            seen = lam if getattr(policy, "sees_lam", True) else None
+            measured = [one for number in range(-(-episodes // BLOCK)) for one in kept.get(name, seen, number)]
+            for episode, values in enumerate(at_lam(measured, lam)):
+                row = {"policy": name, "scenario": scenario.name, "episode": episode, "seed": seeds[episode]} | values
+                rows.append({column: row[column] for column in COLUMNS})
     return Evaluation(scenario, tuple(named), lams, episodes, seed, rows)
 
 
@@ -304,16 +338,17 @@ class _Kept:
         with replacing(self._path) as path:
             path.write_text("".join(json.dumps(line) + "\n" for line in [head, *kept]))
 
-    def get(self, name: str, lam: float | None, number: int, size: int) -> list[dict] | None:
-        measured = self._blocks.get((name, lam, number))
-        return measured if measured is not None and len(measured) == size else None
+    def has(self, block: Block) -> bool:
+        return len(self._blocks.get(block[:3], ())) == len(block.seeds)
 
-    def put(self, name: str, lam: float | None, number: int, measured: list[dict]) -> list[dict]:
-        self._blocks[name, lam, number] = measured
+    def get(self, name: str, lam: float | None, number: int) -> list[dict]:
+        return self._blocks[name, lam, number]
+
+    def put(self, block: Block, measured: list[dict]) -> None:
+        self._blocks[block[:3]] = measured
         if self._path is not None:
             with open(self._path, "a") as file:
-                file.write(json.dumps([name, lam, number, measured]) + "\n")
-        return measured
+                file.write(json.dumps([*block[:3], measured]) + "\n")
 
 
 def forget_blocks(folder: str | Path) -> None:

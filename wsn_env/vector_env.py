@@ -182,11 +182,16 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         """(B,) the present episodes' trade-offs [m/mJ]."""
         return self._state.lam
 
+    @property
+    def view(self) -> View:
+        """What hand-written policies see now, all rows: `policy.act(envs.view)` is their choice."""
+        if self._view is None:
+            raise gym.error.ResetNeeded("call reset() first")
+        return self._view
+
     def action_masks(self) -> np.ndarray:
         """(B, n) bool: which entries of each row's action make sense now."""
-        if self._view is None:
-            raise gym.error.ResetNeeded("call reset() before action_masks()")
-        return self.interface.action.masks(self._view)
+        return self.interface.action.masks(self.view)
 
     def render(self):
         """A tuple of B frames (H, W, 3) uint8."""

@@ -1,0 +1,106 @@
+"""Evaluation on a Ray cluster: the local rows to the byte, whoever is killed."""
+
+import os
+import pickle
+import signal
+
+import pytest
+
+from agents.ppo import PPOPolicy
+from wsn_env import Scenario, evaluate, make_policy
+from wsn_env.cli import main
+from wsn_env.evaluation import BLOCK
+from wsn_env.ray_engine import on_ray
+
+SCENARIO = Scenario.named("PreDC-v0", particles=50, nodes=40, side_m=50.0, crossing_m=20.0, periods=10)
+ROOT = os.path.dirname(os.path.dirname(__file__))
+
+
+@pytest.fixture
+def cluster(monkeypatch):
+    """Two nodes on this machine, with a core each."""
+    pytest.importorskip("ray")
+    from ray.cluster_utils import Cluster
+
+    monkeypatch.setenv("RAY_ENABLE_UV_RUN_RUNTIME_ENV", "0")
+    nodes = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    nodes.other = nodes.add_node(num_cpus=1)
+    nodes.wait_for_nodes()
+    yield nodes
+    nodes.shutdown()
+
+
+@pytest.mark.slow
+def test_a_node_that_is_killed_costs_a_retry_and_not_a_row(cluster, tmp_path):
+    lams, episodes = [1.0, 10.0], 20 * BLOCK
+    policies = ["ppo", "pre_dc", "nearest1"]
+    evaluate(policies, SCENARIO, lams, episodes).save(tmp_path / "local")
+    seen = []
+
+    def kill(done, total, what):
+        seen.append((done, total))
+        if done == 15:
+            cluster.remove_node(cluster.other, allow_graceful=False)
+
+    spread = evaluate(policies, SCENARIO, lams, episodes, progress=kill, engine=on_ray(cluster.address))
+    spread.save(tmp_path / "spread")
+    assert seen == [(done, 80) for done in range(1, 81)]
+    local, other = ((tmp_path / name / "evaluation.csv").read_bytes() for name in ("local", "spread"))
+    assert local == other
+
+
+@pytest.mark.slow
+def test_a_worker_that_is_killed_costs_a_retry(tmp_path):
+    ray = pytest.importorskip("ray")
+    ray.init(num_cpus=2, log_to_driver=False)
+    try:
+        marks = tmp_path / "killed"
+        policies = {"suicidal": _Suicidal(SCENARIO, str(marks)), "pre_dc": make_policy("pre_dc", SCENARIO)}
+        spread = evaluate(policies, SCENARIO, [4.0], 3 * BLOCK, engine=on_ray())
+        assert marks.exists()
+        local = evaluate(policies, SCENARIO, [4.0], 3 * BLOCK)
+        assert repr(spread.rows) == repr(local.rows)
+    finally:
+        ray.shutdown()
+
+
+class _Suicidal:
+    """Pre-DC, but kill -9 to the first process that plays it."""
+
+    def __init__(self, scenario, marks):
+        self.policy, self.marks = make_policy("pre_dc", scenario), marks
+
+    def act(self, view):
+        if not os.path.exists(self.marks):
+            open(self.marks, "w").close()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return self.policy.act(view)
+
+
+@pytest.mark.slow
+def test_the_command_stops_and_continues(tmp_path):
+    pytest.importorskip("ray")
+    asked = ["evaluate", "--policies", "nearest1", "pre_dc", "--episodes", "120", "--set", "periods=10", "particles=50"]
+    assert main([*asked, "--out", str(tmp_path / "local")]) == 0
+    assert main([*asked, "--out", str(tmp_path / "ray"), "--engine", "ray"]) == 0
+    local, other = ((tmp_path / name / "evaluation.csv").read_bytes() for name in ("local", "ray"))
+    assert local == other
+
+
+def test_an_address_needs_the_engine(capsys):
+    assert main(["evaluate", "--address", "auto"]) == 2
+    assert "--engine ray" in capsys.readouterr().err
+
+
+def test_a_learned_policy_travels_without_its_file(tmp_path):
+    shipped = make_policy("ppo", SCENARIO)
+    for suffix in ("json", "safetensors"):
+        source = os.path.join(ROOT, "agents", "pretrained", "PreDC-v0", f"policy.{suffix}")
+        (tmp_path / f"policy.{suffix}").write_bytes(open(source, "rb").read())
+    policy = PPOPolicy(SCENARIO, path=str(tmp_path / "policy.json"))
+    sent = pickle.dumps(policy)
+    for file in tmp_path.iterdir():
+        file.unlink()
+    arrived = pickle.loads(sent)
+    rows = evaluate({"it": arrived}, SCENARIO, [4.0], 3).values("it", 4.0, "return")
+    assert (rows == evaluate({"it": shipped}, SCENARIO, [4.0], 3).values("it", 4.0, "return")).all()
