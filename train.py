@@ -13,6 +13,7 @@ import time
 from collections import deque
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import torch
@@ -26,6 +27,7 @@ from stable_baselines3.common.vec_env import VecMonitor
 from agents.actor_critic import EntryPolicy, network_of
 from agents.fleet import Fleet
 from agents.levelling import LevelledRollout
+from agents.network import Network
 from agents.ppo import PPOPolicy, save_policy
 from agents.recipe import other_densities, suited_level, suited_order
 from agents.sb3 import SB3VecEnv
@@ -78,6 +80,13 @@ class Training:
     resume: bool = False
     """Continue the run of this name from its last checkpoint (or begin it). The episodes after it are others than in a
     training that was never stopped."""
+    engine: Literal["local", "ray"] = "local"
+    """What trains: stable-baselines3 in this process, or RLlib with a native batch in every runner of a Ray cluster.
+    The network, the rewards and the fields are the same, PPO's details are each library's own."""
+    runners: int = 2
+    """Of the Ray cluster, a core each; the rows are dealt among them."""
+    address: str | None = None
+    """Of a running Ray cluster; left out: one on this machine."""
 
     # PPO
     steps: int = 3_000_000
@@ -154,29 +163,13 @@ def train(settings: Training) -> None:
         reward=settings.reward,
         order=settings.order,
     )
-    envs = make_envs(settings, scenario, speaks)
     folder = open_folder(settings)
-    model = make_model(settings, VecMonitor(envs), folder)
-    left = settings.steps - model.num_timesteps
-    if left > 0:
-        started, busy = time.perf_counter(), time.process_time()
-        model.set_logger(configure(str(folder / f"progress-{model.num_timesteps}"), ["tensorboard", "csv"]))
-        with progress_bar() as report:
-            callback = Watch(settings, folder, report)
-            try:
-                model.learn(left, callback=callback, reset_num_timesteps=False)
-            finally:
-                save_checkpoint(model, folder)
-        seconds = time.perf_counter() - started
-        print(
-            f"trained {left:,} periods in {seconds:.0f} s ({left / seconds:,.0f} a second), "
-            f"{100 * envs.seconds / seconds:.0f} % of it in the environment, "
-            f"{(time.process_time() - busy) / seconds:.1f} cores busy"
-        )
+    learn = learn_on_ray if settings.engine == "ray" else learn_here
+    network = learn(settings, scenario, speaks, folder)
 
     made = {name: value for name, value in plain(settings).items() if name not in ("name", "runs", "resume")}
     facts = {"training": made, "scenario": scenario.as_dict(), "versions": versions()}
-    policy = save_policy(folder, network_of(model), speaks, facts)
+    policy = save_policy(folder, network, speaks, facts)
     print(f"saved: {policy}")
     if settings.episodes:
         compare(settings, scenario, policy)
@@ -197,15 +190,71 @@ def complete(settings: Training) -> Scenario:
     return scenario.override(lam=settings.lam[0] if len(settings.lam) == 1 else tuple(settings.lam))
 
 
-def make_envs(settings: Training, scenario: Scenario, speaks: Settings) -> SB3VecEnv:
+def learn_here(settings: Training, scenario: Scenario, speaks: Settings, folder: Path) -> Network:
+    """stable-baselines3's PPO."""
+    envs = SB3VecEnv(make_envs(settings, scenario, speaks, settings.rows, "Disabled"), stagger=True)
+    model = make_model(settings, VecMonitor(envs), folder)
+    left = settings.steps - model.num_timesteps
+    if left > 0:
+        started, busy = time.perf_counter(), time.process_time()
+        model.set_logger(configure(str(folder / f"progress-{model.num_timesteps}"), ["tensorboard", "csv"]))
+        with progress_bar() as report:
+            callback = Watch(settings, folder, report)
+            try:
+                model.learn(left, callback=callback, reset_num_timesteps=False)
+            finally:
+                save_checkpoint(model, folder)
+        seconds = time.perf_counter() - started
+        print(
+            f"trained {left:,} periods in {seconds:.0f} s ({left / seconds:,.0f} a second), "
+            f"{100 * envs.seconds / seconds:.0f} % of it in the environment, "
+            f"{(time.process_time() - busy) / seconds:.1f} cores busy"
+        )
+    return network_of(model)
+
+
+def learn_on_ray(settings: Training, scenario: Scenario, speaks: Settings, folder: Path) -> Network:
+    """RLlib's PPO."""
+    try:
+        from agents.rllib import RayTraining
+    except ImportError as problem:
+        raise ValueError(f"engine 'ray': pip install 'wsn_env[ray]' ({problem})") from None
+
+    whole = make_envs(settings, scenario, speaks, len(settings.vary) + 1, "NextStep")
+    training = RayTraining(
+        lambda rows: make_envs(settings, scenario, speaks, rows, "NextStep"),
+        entries(settings, whole.single_observation_space),
+        folder / "ray",
+        rows=settings.rows,
+        runners=settings.runners,
+        rollout=settings.rollout,
+        level=settings.level,
+        seed=settings.seed,
+        address=settings.address,
+        lr=[[0, settings.learning_rate], [settings.steps, 0.0]],
+        gamma=settings.gamma,
+        lambda_=settings.gae_lambda,
+        entropy_coeff=settings.entropy,
+        minibatch_size=settings.batch,
+        num_epochs=settings.epochs,
+    )
+    with training, progress_bar() as report:
+        started, before = time.perf_counter(), training.periods
+        training.run(settings.steps, settings.checkpoint_steps, report)
+        left, seconds = training.periods - before, time.perf_counter() - started
+        print(f"trained {left:,} periods in {seconds:.0f} s ({left / seconds:,.0f} a second)")
+        return training.network()
+
+
+def make_envs(settings: Training, scenario: Scenario, speaks: Settings, rows: int, mode: str) -> Fleet:
     """The rows, dealt among the scenarios."""
     scenarios = [scenario, *(scenario.override(**parse_overrides(text.split(","))) for text in settings.vary)]
-    shares = np.diff(np.arange(len(scenarios) + 1) * settings.rows // len(scenarios))
+    shares = np.diff(np.arange(len(scenarios) + 1) * rows // len(scenarios))
     parts = []
-    for one, rows in zip(scenarios, shares):
-        envs = ClusterVectorEnv(int(rows), one, autoreset_mode="Disabled", **asdict(speaks))
+    for one, share in zip(scenarios, shares):
+        envs = ClusterVectorEnv(int(share), one, autoreset_mode=mode, **asdict(speaks))
         parts.append(TrainingReward(envs, calibrated=settings.reward == "belief"))
-    return SB3VecEnv(Fleet(parts), stagger=True)
+    return Fleet(parts)
 
 
 def check(settings: Training) -> None:
@@ -220,8 +269,15 @@ def check(settings: Training) -> None:
     for name, allowed in (("network", ("entries", "flat")), ("action", ("menu", "subset"))):
         if getattr(settings, name) not in allowed:
             raise ValueError(f"train.py: {name} = {getattr(settings, name)!r}: must be one of {', '.join(allowed)}")
-    if settings.rows <= len(settings.vary):
-        raise ValueError(f"train.py: rows = {settings.rows}: must be above {len(settings.vary)}, one a scenario")
+    check_quantity("train.py", "runners", settings.runners, at_least=0, whole=True)
+    shares = 1 if settings.engine == "local" else max(1, settings.runners)
+    if settings.rows // shares <= len(settings.vary):
+        least = shares * (len(settings.vary) + 1)
+        raise ValueError(f"train.py: rows = {settings.rows}: must be at least {least}, one a scenario and runner")
+    if settings.engine == "ray" and settings.network != "entries":
+        raise ValueError(f"train.py: network = {settings.network!r}: the engine ray trains only 'entries'")
+    if settings.address and settings.engine != "ray":
+        raise ValueError(f"train.py: address = {settings.address!r}: only with --engine ray")
     # Every seed that training may use lies below those of evaluations.
     most = FIRST_SEED - settings.steps - settings.rows
     check_quantity("train.py", "seed", settings.seed, at_least=0, at_most=most, whole=True)
@@ -233,12 +289,12 @@ def open_folder(settings: Training) -> Path:
     """The run's folder with config.json; an existing run is only touched by --resume, with the same settings."""
     folder = settings.folder
     path = folder / "config.json"
-    begun = (folder / "checkpoint.zip").exists() or (folder / "policy.json").exists()
+    begun = any((folder / name).exists() for name in ("checkpoint.zip", "ray", "policy.json"))
     if path.exists() and begun:
         if not settings.resume:
             raise ValueError(f"{folder} exists: --resume continues it, --name begins another, or remove it")
         old, new = json.loads(path.read_text()), plain(settings)
-        free = {"resume", "runs", "episodes", "evaluation_seed", "checkpoint_steps"}
+        free = {"resume", "runs", "episodes", "evaluation_seed", "checkpoint_steps", "address"}
         differing = [name for name in new if name not in free and old.get(name) != new[name]]
         if differing:
             name = differing[0]
@@ -288,16 +344,20 @@ def architecture(settings: Training, envs) -> tuple:
     """The kind of PPO's policy, and its arguments."""
     if settings.network == "flat":
         return "MlpPolicy", {"net_arch": {"pi": list(settings.units), "vf": list(settings.critic)}}
+    return EntryPolicy, {"entries": entries(settings, envs.observation_space)}
+
+
+def entries(settings: Training, space) -> dict:
+    """Arguments of EntryActorCritic."""
     menu = settings.action == "menu"
-    entries = dict(
+    return dict(
         belief=len(BELIEF_FEATURES),
         entry=len(ENTRY_FEATURES if menu else CANDIDATE_FEATURES),
-        observation=envs.observation_space.shape[0],
+        observation=space.shape[0],
         outputs=1 if menu else 2,
         actor=settings.units,
         critic=settings.critic,
     )
-    return EntryPolicy, {"entries": entries}
 
 
 def save_checkpoint(model: PPO, folder: Path) -> None:

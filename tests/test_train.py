@@ -4,6 +4,7 @@ import json
 import shutil
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ import train
 from agents.actor_critic import network_of
 from agents.network import EntryNetwork, Network
 from agents.ppo import PPOPolicy
-from wsn_env import ClusterVectorEnv, Scenario, View, make_policy
+from wsn_env import ClusterVectorEnv, Scenario, View, evaluate, make_policy
 from wsn_env.cli import parse_overrides
 
 SET = ["particles=50", "nodes=40", "side_m=50", "crossing_m=20", "periods=10"]
@@ -92,6 +93,37 @@ def test_a_stopped_training_goes_on(tmp_path, monkeypatch):
     steps = sorted(int(path.name.split("-")[1]) for path in (tmp_path / "stopped").glob("progress-*"))
     assert steps == [0, 2048]
     assert json.loads((tmp_path / "stopped" / "policy.json").read_text())["training"]["steps"] == 4096
+
+
+@pytest.mark.slow
+def test_rllib_trains_the_same_network_and_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
+    pytest.importorskip("ray")
+    settings = dict(SHORT, engine="ray", runners=1, episodes=0, name="short", runs=tmp_path)
+
+    @contextmanager
+    def stopping():
+        def stop(done, total, what):
+            if done >= total // 2:
+                raise KeyboardInterrupt
+
+        yield stop
+
+    with monkeypatch.context() as patch:
+        patch.setattr(train, "progress_bar", stopping)
+        with pytest.raises(KeyboardInterrupt):
+            train.train(train.Training(**settings))
+    folder = tmp_path / "short"
+    half = json.loads((folder / "ray" / "periods.json").read_text())
+    assert SHORT["steps"] // 2 <= half < SHORT["steps"] and not (folder / "policy.json").exists()
+    with pytest.raises(ValueError, match="--resume"):
+        train.train(train.Training(**settings))
+    train.train(train.Training(**settings, resume=True))
+    assert json.loads((folder / "ray" / "periods.json").read_text()) >= SHORT["steps"]
+    assert sorted(path.name for path in folder.iterdir()) == ["config.json", "policy.json", "policy.safetensors", "ray"]
+    network = Network.load(folder / "policy.safetensors")
+    assert isinstance(network, EntryNetwork) and network.sizes["outputs"] == 1
+    scenario = Scenario.named("PreDC-v0", **parse_overrides(SET))
+    assert evaluate([str(folder)], scenario, [4.0], episodes=3).values(str(folder), 4.0, "return").shape == (3,)
 
 
 def test_damaged_files_say_so(run, tmp_path):
