@@ -220,9 +220,9 @@ def learn_on_ray(settings: Training, scenario: Scenario, speaks: Settings, folde
     except ImportError as problem:
         raise ValueError(f"engine 'ray': pip install 'wsn_env[ray]' ({problem})") from None
 
-    whole = make_envs(settings, scenario, speaks, len(settings.vary) + 1, "NextStep")
+    whole = make_envs(settings, scenario, speaks, len(settings.vary) + 1, "Disabled")
     training = RayTraining(
-        lambda rows: make_envs(settings, scenario, speaks, rows, "NextStep"),
+        lambda rows: make_envs(settings, scenario, speaks, rows, "Disabled"),
         entries(settings, whole.single_observation_space),
         folder / "ray",
         rows=settings.rows,

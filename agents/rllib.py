@@ -22,6 +22,7 @@ from ray.tune.registry import register_env
 
 from agents.actor_critic import EntryActorCritic
 from agents.levelling import Levelling
+from agents.native_runner import NativeRunner
 from agents.network import EntryNetwork
 from wsn_env.progress import Progress
 
@@ -82,7 +83,7 @@ class RayTraining:
     """PPO on a Ray cluster, from its last checkpoint where there is one; a context, which stops what it has started.
 
     Args:
-        make_rows: how many -> native vector environment in next-step mode, with the training's rewards.
+        make_rows: how many -> native vector environment in disabled autoreset mode, with the training's rewards.
         entries: arguments of EntryActorCritic.
         folder: of the checkpoint.
         rows: over all runners.
@@ -120,6 +121,7 @@ class RayTraining:
             PPOConfig()
             .environment("wsn_env")
             .env_runners(
+                env_runner_cls=NativeRunner,
                 num_env_runners=runners,
                 num_envs_per_env_runner=each,
                 gym_env_vectorize_mode="vector_entry_point",
