@@ -10,7 +10,7 @@ VENV := .venv
 RUN := $(VENV)/bin/python
 READY := $(VENV)/.ready
 
-.PHONY: train pretrained test slow bench bench-short lint clean
+.PHONY: train pretrained test slow examples bench bench-short lint clean
 
 train: $(READY)
 	$(RUN) train.py --resume --scenario $(SCENARIO) $(if $(LAM),--lam $(LAM))
@@ -30,6 +30,10 @@ test: $(READY)
 # The studies that `make test` leaves out, a few minutes.
 slow: $(READY)
 	$(RUN) -m pytest -m slow
+
+# Every toolkit's example in a virtual environment of its own, half an hour, most of it pip's; renews docs/toolkits.md.
+examples: $(READY)
+	$(RUN) -m examples --torch-index "$(TORCH_INDEX)"
 
 # Every claim about speed against its peers, some ten minutes; renews docs/performance.md.
 bench: $(VENV)/.bench
