@@ -192,7 +192,7 @@ def complete(settings: Training) -> Scenario:
 
 def learn_here(settings: Training, scenario: Scenario, speaks: Settings, folder: Path) -> Network:
     """stable-baselines3's PPO."""
-    envs = SB3VecEnv(make_envs(settings, scenario, speaks, settings.rows, "Disabled"), stagger=True)
+    envs = SB3VecEnv(make_envs(settings, scenario, speaks, settings.rows), stagger=True)
     model = make_model(settings, VecMonitor(envs), folder)
     left = settings.steps - model.num_timesteps
     if left > 0:
@@ -220,9 +220,9 @@ def learn_on_ray(settings: Training, scenario: Scenario, speaks: Settings, folde
     except ImportError as problem:
         raise ValueError(f"engine 'ray': pip install 'wsn_env[ray]' ({problem})") from None
 
-    whole = make_envs(settings, scenario, speaks, len(settings.vary) + 1, "Disabled")
+    whole = make_envs(settings, scenario, speaks, len(settings.vary) + 1)
     training = RayTraining(
-        lambda rows: make_envs(settings, scenario, speaks, rows, "Disabled"),
+        lambda rows: make_envs(settings, scenario, speaks, rows),
         entries(settings, whole.single_observation_space),
         folder / "ray",
         rows=settings.rows,
@@ -246,13 +246,13 @@ def learn_on_ray(settings: Training, scenario: Scenario, speaks: Settings, folde
         return training.network()
 
 
-def make_envs(settings: Training, scenario: Scenario, speaks: Settings, rows: int, mode: str) -> Fleet:
+def make_envs(settings: Training, scenario: Scenario, speaks: Settings, rows: int) -> Fleet:
     """The rows, dealt among the scenarios."""
     scenarios = [scenario, *(scenario.override(**parse_overrides(text.split(","))) for text in settings.vary)]
     shares = np.diff(np.arange(len(scenarios) + 1) * rows // len(scenarios))
     parts = []
     for one, share in zip(scenarios, shares):
-        envs = ClusterVectorEnv(int(share), one, autoreset_mode=mode, **asdict(speaks))
+        envs = ClusterVectorEnv(int(share), one, autoreset_mode="Disabled", **asdict(speaks))
         parts.append(TrainingReward(envs, calibrated=settings.reward == "belief"))
     return Fleet(parts)
 

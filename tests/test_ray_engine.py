@@ -32,19 +32,19 @@ def cluster(monkeypatch):
 
 @pytest.mark.slow
 def test_a_node_that_is_killed_costs_a_retry_and_not_a_row(cluster, tmp_path):
-    lams, episodes = [1.0, 10.0], 20 * BLOCK
+    lams, episodes = [1.0, 10.0], 8 * BLOCK
     policies = ["ppo", "pre_dc", "nearest1"]
     evaluate(policies, SCENARIO, lams, episodes).save(tmp_path / "local")
     seen = []
 
     def kill(done, total, what):
         seen.append((done, total))
-        if done == 15:
+        if done == 8:
             cluster.remove_node(cluster.other, allow_graceful=False)
 
     spread = evaluate(policies, SCENARIO, lams, episodes, progress=kill, engine=on_ray(cluster.address))
     spread.save(tmp_path / "spread")
-    assert seen == [(done, 80) for done in range(1, 81)]
+    assert seen == [(done, 32) for done in range(1, 33)]
     local, other = ((tmp_path / name / "evaluation.csv").read_bytes() for name in ("local", "spread"))
     assert local == other
 

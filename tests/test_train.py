@@ -152,7 +152,7 @@ def test_advantages_are_levelled_as_asked_for_or_where_nodes_measure_positions(a
     settings = train.Training(**asked)
     scenario = train.complete(settings)
     speaks = train.Settings(action="menu", observation="menu", reward="belief", order=settings.order)
-    envs = train.VecMonitor(train.make_envs(settings, scenario, speaks))
+    envs = train.VecMonitor(train.SB3VecEnv(train.make_envs(settings, scenario, speaks, settings.rows), stagger=True))
     buffer = train.make_model(settings, envs, Path("nowhere")).rollout_buffer
     buffer.observations[0, :, :] = envs.reset()
     buffer.rewards[0] = 1.0 + np.arange(buffer.n_envs)
@@ -172,6 +172,10 @@ def test_advantages_are_levelled_as_asked_for_or_where_nodes_measure_positions(a
         dict(episodes=-1),
         dict(units=(0, 8)),
         dict(network="deep"),
+        dict(engine="ray", network="flat"),
+        dict(address="auto"),
+        dict(runners=-1),
+        dict(rows=5, engine="ray"),
     ],
 )
 def test_bad_settings_are_refused_before_anything_is_done(bad, tmp_path):
