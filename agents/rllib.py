@@ -25,6 +25,7 @@ from agents.levelling import Levelling
 from agents.native_runner import NativeRunner
 from agents.network import EntryNetwork
 from wsn_env.progress import Progress
+from wsn_env.ray_engine import connect
 
 PERIODS = "periods.json"
 
@@ -111,10 +112,7 @@ class RayTraining:
     ):
         self.periods = 0
         self._folder = folder
-        try:
-            ray.init(address, log_to_driver=False, logging_level="error")
-        except ConnectionError as problem:
-            raise ValueError(f"engine 'ray': no cluster at {address!r}: {problem}") from None
+        connect(address)
         register_env("wsn_env", lambda context: _OwnSeeds(make_rows(context["num_envs"]), seed))
         each = rows // max(runners, 1)
         self._algorithm = (

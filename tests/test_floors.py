@@ -34,6 +34,7 @@ FLOORS = {
     "wsn_env.env": 6,
     "wsn_env.vector_env": 6,
     "agents.planner": 7,  # it rehearses and compares
+    "agents.rllib": 7,  # joins a cluster
     "agents.sb3": 7,  # adapts the vector environment
     "wsn_env.evaluation": 7,
     "wsn_env.scoring": 7,

@@ -92,6 +92,13 @@ def test_an_address_needs_the_engine(capsys):
     assert "--engine ray" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("address", ["127.0.0.1:1", "nowhere", "127.0.0.1:port"])
+def test_nobody_at_the_address_is_said_at_once(address, capsys):
+    pytest.importorskip("ray")
+    assert main(["evaluate", "--engine", "ray", "--address", address, "--episodes", "3"]) == 2
+    assert f"nobody answers at '{address}'" in capsys.readouterr().err
+
+
 def test_a_learned_policy_travels_without_its_file(tmp_path):
     shipped = make_policy("ppo", SCENARIO)
     for suffix in ("json", "safetensors"):

@@ -40,7 +40,7 @@ class Evaluate:
     engine: Literal["local", "ray"] = "local"
     """Where the episodes are played: in this process, or as tasks of a Ray cluster. The rows are the same."""
     address: str | None = None
-    """Of a running Ray cluster, such as auto or ray://HOST:10001; left out: one on this machine."""
+    """Of a running Ray cluster, such as auto or HOST:6379; left out: one on this machine."""
     out: Path | None = None
     """Folder for the files; left out: only the table. A run that was stopped continues from it."""
 

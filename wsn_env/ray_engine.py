@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Iterator, Sequence
 
 from wsn_env.evaluation import Block, Engine, in_this_process
 
 AHEAD = 4  # tasks a core that wait their turn
+PATIENCE_S = 5.0
 
 
 def on_ray(address: str | None = None) -> Engine:
@@ -16,8 +18,7 @@ def on_ray(address: str | None = None) -> Engine:
     those of a single process, whatever the number of workers and whoever was killed.
 
     Args:
-        address: of a running cluster, such as "auto" or "ray://HOST:10001"; None: one on this machine, for this
-            evaluation.
+        address: of a running cluster, such as "auto" or "HOST:6379"; None: one on this machine, for this evaluation.
 
     Raises:
         ValueError: without Ray, or with nobody at the address.
@@ -30,10 +31,7 @@ def on_ray(address: str | None = None) -> Engine:
     def play(blocks: Sequence[Block]) -> Iterator[tuple[Block, list[dict]]]:
         ours = not ray.is_initialized()
         if ours:
-            try:
-                ray.init(address, log_to_driver=False, logging_level="error")
-            except ConnectionError as problem:
-                raise ValueError(f"engine 'ray': no cluster at {address!r}: {problem}") from None
+            connect(address)
         try:
             yield from _spread(ray, blocks)
         finally:
@@ -41,6 +39,27 @@ def on_ray(address: str | None = None) -> Engine:
                 ray.shutdown()
 
     return play
+
+
+def connect(address: str | None) -> None:
+    """Join the cluster at an address, or begin one on this machine.
+
+    Raises:
+        ValueError: with nobody at the address. Ray itself would try for minutes.
+    """
+    import ray
+
+    allowed = "must be HOST:PORT, ray://HOST:PORT, or auto for one that runs on this machine"
+    if address not in (None, "auto"):
+        host, _, port = address.removeprefix("ray://").rpartition(":")
+        try:
+            socket.create_connection((host, int(port)), timeout=PATIENCE_S).close()
+        except (OSError, ValueError) as problem:
+            raise ValueError(f"engine 'ray': nobody answers at {address!r} ({problem}): {allowed}") from None
+    try:
+        ray.init(address, log_to_driver=False, logging_level="error")
+    except ConnectionError as problem:
+        raise ValueError(f"engine 'ray': no cluster at {address!r} ({problem}): {allowed}") from None
 
 
 def _spread(ray, blocks: Sequence[Block]) -> Iterator[tuple[Block, list[dict]]]:
