@@ -32,7 +32,7 @@ from agents.ppo import PPOPolicy, save_policy
 from agents.recipe import other_densities, suited_level, suited_order
 from agents.sb3 import SB3VecEnv
 from agents.training_reward import TrainingReward
-from wsn_env.cli import make_scenario, parse_overrides
+from wsn_env.cli import make_scenario
 from wsn_env.evaluation import FIRST_SEED, evaluate, evaluation_seeds, forget_blocks, versions
 from wsn_env.files import replacing
 from wsn_env.interface import Settings
@@ -40,7 +40,7 @@ from wsn_env.interface.features import BELIEF_FEATURES, CANDIDATE_FEATURES
 from wsn_env.interface.prospects import ENTRY_FEATURES
 from wsn_env.policies import make_policy, policy_names
 from wsn_env.progress import progress_bar
-from wsn_env.quantity import check_quantity
+from wsn_env.quantity import check_quantity, parse_overrides
 from wsn_env.reports import draw_front, print_tables, save_markdown
 from wsn_env.scenario import Scenario
 from wsn_env.vector_env import ClusterVectorEnv

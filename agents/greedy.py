@@ -17,7 +17,7 @@ from wsn_env.physics.field import squared_distance
 from wsn_env.physics.radio import TO_HEAD, in_one_hop, relayed, transmission
 from wsn_env.physics.sensing import BINARY
 from wsn_env.quantity import check_quantity
-from wsn_env.types import Cluster
+from wsn_env.types import Cluster, Sensors
 from wsn_env.view import View
 
 CANDIDATES = 12
@@ -65,13 +65,13 @@ class Greedy(ViewPolicy):
         heads, members = view.nearest_living().copy(), np.empty((len(nodes), CANDIDATES), np.int32)
         numbers = view.lam / terms[:, 1], 1.0 / terms[:, 2]
         standing = view.head.copy(), view.network.members, view.network.row["n_members"].copy()
-        known = constants(self.scenario), view.positions, view.belief
+        known = constants(self.scenario), view.positions, view.receivers, view.belief
         _bargain(0, len(nodes), *known, *standing, *numbers, nodes, heads, members)
         return Cluster(heads, members)
 
 
 @kernel
-def _bargain(start, stop, cs, positions, beliefs, old, awake, n_awake, lams, parts, nodes, heads, members):
+def _bargain(start, stop, cs, positions, receivers, beliefs, old, awake, n_awake, lams, parts, nodes, heads, members):
     """Fill members (B, K), and put the standing head into heads (B,), which hold its rival, where it does no worse.
 
     Args:
@@ -82,42 +82,41 @@ def _bargain(start, stop, cs, positions, beliefs, old, awake, n_awake, lams, par
     """
     stay = np.empty(nodes.shape[1], np.int32)
     for b in range(start, stop):
-        given = positions[b], beliefs[b], old[b], awake[b, : n_awake[b]], lams[b], parts[b], nodes[b], cs[0]
+        sensors = Sensors(positions[b], receivers[b])
+        given = sensors, beliefs[b], old[b], awake[b, : n_awake[b]], lams[b], parts[b], nodes[b], cs[0]
         moved = _gather(heads[b], members[b], *given)
         if old[b] >= 0 and old[b] != heads[b] and _gather(old[b], stay, *given) >= moved:
             heads[b], members[b] = old[b], stay
 
 
 @piece
-def _gather(head, chosen, positions, belief, old, awake, lam, part, nodes, c):
+def _gather(head, chosen, sensors, belief, old, awake, lam, part, nodes, c):
     """The cluster about a head in `chosen`, -1 at the end; returns what it is worth, less its price [m]."""
     mean, cov = belief.predicted_mean, belief.predicted_cov
     p00, p01, p11 = cov[0, 0], cov[0, 2], cov[2, 2]
     chosen[:] = -1
     if head < 0:
         return 0.0
-    detection = chance(positions, head, mean, cov, c)
-    drop, q00, q01, q11 = gain(detection, positions, head, mean, cov, p00, p01, p11, c)
-    total = (
-        np.sqrt(p00 + p11) - np.sqrt(max(p00 + p11 - drop, 0.0)) - lam * part * _handover_mj(old, head, positions, c)
-    )
+    detection = chance(sensors, head, mean, cov, c)
+    drop, q00, q01, q11 = gain(detection, sensors, head, mean, cov, p00, p01, p11, c)
+    total = np.sqrt(p00 + p11) - np.sqrt(max(p00 + p11 - drop, 0.0)) - lam * part * _handover_mj(old, head, sensors, c)
     p00, p01, p11 = q00, q01, q11
     size = len(nodes)
     detections, prices = np.empty(size), np.empty(size)
     for k in range(size):
         prices[k] = np.inf  # no candidate
         node = nodes[k]
-        if node < 0 or node == head or not in_one_hop(node, head, positions, c):
+        if node < 0 or node == head or not in_one_hop(node, head, sensors.positions, c):
             continue
-        detections[k] = chance(positions, node, mean, cov, c)
+        detections[k] = chance(sensors, node, mean, cov, c)
         if detections[k] > LEAST_DETECTION or c.model == BINARY:  # out of reach only a bit tells
-            called = _invitation_mj(node, head, old, awake, positions, c)
-            prices[k] = lam * (price_mj(detections[k], positions, node, head, mean, c) + part * called)
+            called = _invitation_mj(node, head, old, awake, sensors, c)
+            prices[k] = lam * (price_mj(detections[k], sensors, node, head, mean, c) + part * called)
     for slot in range(size):
         best, most, after = -1, 0.0, (p00, p01, p11)
         for k in range(size):
             if prices[k] < np.inf:
-                drop, q00, q01, q11 = gain(detections[k], positions, nodes[k], mean, cov, p00, p01, p11, c)
+                drop, q00, q01, q11 = gain(detections[k], sensors, nodes[k], mean, cov, p00, p01, p11, c)
                 value = np.sqrt(p00 + p11) - np.sqrt(max(p00 + p11 - drop, 0.0)) - prices[k]
                 if value > most:
                     best, most, after = k, value, (q00, q01, q11)
@@ -131,16 +130,16 @@ def _gather(head, chosen, positions, belief, old, awake, lam, part, nodes, c):
 
 
 @piece
-def _handover_mj(old, head, positions, c):
+def _handover_mj(old, head, sensors, c):
     """From the standing head, if there is one; a sink or the target needs none."""
     if c.receiver != TO_HEAD or old < 0 or old == head:
         return 0.0
-    squared = squared_distance(positions, old, positions[head, 0], positions[head, 1])
+    squared = squared_distance(sensors.positions, old, sensors.positions[head, 0], sensors.positions[head, 1])
     return 1e3 * (relayed(c.handover_bits, squared, c) + c.handover_bits * c.rx_j_per_bit)
 
 
 @piece
-def _invitation_mj(node, head, old, awake, positions, c):
+def _invitation_mj(node, head, old, awake, sensors, c):
     """To a node that is not awake yet; a new head invites all."""
     called = node != old
     for member in awake:
@@ -150,5 +149,5 @@ def _invitation_mj(node, head, old, awake, positions, c):
         return 1e3 * hearing * called
     if not called and head == old:
         return 0.0
-    squared = squared_distance(positions, node, positions[head, 0], positions[head, 1])
+    squared = squared_distance(sensors.positions, node, sensors.positions[head, 0], sensors.positions[head, 1])
     return 1e3 * (transmission(c.invitation_bits, squared, c) + hearing)

@@ -168,5 +168,6 @@ def _correct(mean, cov, hx, hy, innovation, r):
 def rows_of(value, rows):
     """Some rows of a View or of nested NamedTuples of arrays: a slice, or their numbers."""
     if isinstance(value, View):
-        return View(*(rows_of(part, rows) for part in (value.row, value.belief, value.network, value.reports)))
+        parts = value.row, value.belief, value.network, value.reports, value.receivers
+        return View(*(rows_of(part, rows) for part in parts))
     return type(value)(*(rows_of(part, rows) for part in value)) if isinstance(value, tuple) else value[rows]

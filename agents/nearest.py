@@ -66,7 +66,8 @@ def surround(view: View, scenario: Scenario, order: str, hysteresis_m, sizes, mo
     else:
         candidates = view.nearest(max(CANDIDATES, most + 1), scenario.ring_m)[0]
         nodes, free = np.empty((len(kept), most + 1), np.int64), np.zeros(len(kept))
-        order_by_merit(0, len(kept), constants(scenario), view.positions, kept, view.belief, free, candidates, nodes)
+        seen = view.positions, view.receivers, kept, view.belief, free
+        order_by_merit(0, len(kept), constants(scenario), *seen, candidates, nodes)
     head = np.where(kept >= 0, kept, nodes[:, 0])
     others = (nodes >= 0) & (nodes != head[:, None])
     members = np.where(others & (np.cumsum(others, axis=1) <= np.reshape(sizes, (-1, 1))), nodes, -1)
@@ -80,8 +81,10 @@ def check_order(order: str) -> None:
 
 
 def usual_hysteresis_m(scenario: Scenario) -> float:
-    """Where none was tuned [m]. A target that receives itself needs no head: nothing is saved by staying."""
-    return 0.0 if scenario.radio.receiver == "target" else RADII * scenario.radius_m
+    """Where none was tuned [m]. A target that receives itself, or a sink for a beacon's receivers, needs no head:
+    nothing is saved by staying."""
+    free = scenario.radio.receiver == "target" or (scenario.hears and scenario.radio.receiver == "sink")
+    return 0.0 if free else RADII * scenario.radius_m
 
 
 nearest0, nearest1, nearest2, nearest3, nearest4, nearest5, nearest6, nearest7, nearest8 = (

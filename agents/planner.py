@@ -64,6 +64,8 @@ class Planner(ViewPolicy):
     order: str | None = None  # of merit; None: nearest for positions and bits, information for strengths
 
     def __post_init__(self):
+        if self.scenario.hears:
+            raise ValueError("Scenario.measurement = Beacon: planner cannot draw a beacon's biases; allowed are others")
         check_quantity("Planner", "horizon", self.horizon, at_least=1, whole=True)
         check_quantity("Planner", "worlds", self.worlds, at_least=4, whole=True)
         check_quantity("Planner", "doubt", self.doubt, at_least=0)

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from agents.base import ViewPolicy
+from agents.strongest import first_of
 from wsn_env.draws import uniforms
+from wsn_env.quantity import check_quantity
 from wsn_env.types import Cluster
 from wsn_env.view import View
 
@@ -15,12 +17,19 @@ from wsn_env.view import View
 @dataclass(frozen=True)
 class Random(ViewPolicy):
     """Among the living nodes that can detect at the prediction, each is a member with probability one half and any may
-    be the head; the nearest living node leads where none can. Draws on the view's luck, so it is repeatable."""
+    be the head; the nearest living node leads where none can. With `n`: any head and n further members, wherever they
+    stand. Draws on the view's luck, so it is repeatable."""
 
+    n: int | None = None
     sees_lam = False
+
+    def __post_init__(self):
+        check_quantity("Random", "n", self.n, at_least=0, whole=True, optional=True)
 
     def act(self, view: View) -> Cluster:
         """Throw the dice, for every row."""
+        if self.n is not None:
+            return first_of(uniforms(view.luck, view.alive.shape[1]), view, self.n)
         able = self.detection(view) > 0
         nodes = able.shape[1]
         u = uniforms(view.luck, 2 * nodes)

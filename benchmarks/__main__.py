@@ -16,7 +16,10 @@ from benchmarks import page
 from benchmarks.race import Result
 
 # Files of this folder; each is a claim, with the command line of race.main. In the order of running.
-CLAIMS = ("environment", "vector", "overhead", "nodes", "memory", "training", "rllib", "filter_step", "filter_scaling")
+CLAIMS = (
+    *("environment", "vector", "overhead", "nodes", "memory", "training", "rllib", "recording"),
+    *("filter_step", "filter_scaling"),
+)
 
 
 def main() -> int:

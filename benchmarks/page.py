@@ -21,7 +21,10 @@ from wsn_env.files import replacing
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "performance.md"
 RESULTS = ROOT / "benchmarks" / "results"
-ORDER = ("filter_step", "environment", "vector", "overhead", "training", "rllib", "filter_scaling", "nodes", "memory")
+ORDER = (
+    *("filter_step", "environment", "vector", "overhead", "training", "rllib", "filter_scaling", "nodes", "memory"),
+    "recording",
+)
 EVERY_CONTESTANT = ("particles", "rows")  # plots that stand together, at the end
 ENVIRONMENTS = "env_rows"  # joins the second of them
 WIDTH = 128

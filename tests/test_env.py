@@ -24,6 +24,7 @@ SMALL_OTHERS = {  # small enough, in a field of their own
     "Binary-v0": dict(particles=64, nodes=100, periods=7),
     "Anchors-v0": dict(particles=64, periods=7),
     "Underwater-v0": dict(particles=64, nodes=36, periods=7),
+    "Ble-v0": dict(particles=64, periods=7),
 }
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from benchmarks import memory, nodes, overhead, training, vector
+from benchmarks import memory, nodes, overhead, recording, training, vector
 from benchmarks.race import Options
 from benchmarks.stopwatch import Stopwatch
 from wsn_env.types import State
@@ -77,6 +77,14 @@ def test_bytes_are_those_of_every_array():
     assert set(parts) == set(State._fields)
     assert parts["belief"] - memory.bytes_by_part(State.zeros(2, 50, 10, 0))["belief"] == 20 * 100
     assert parts["track"] == 11 * 32
+
+
+def test_reading_a_recording(monkeypatch):
+    result = whole(recording.measure(GLANCE, QUIET), 2)
+    assert [row[0] for row in result.tables[0].rows] == ["read_track", "csv and float", "numpy.loadtxt"]
+    monkeypatch.setattr(recording, "by_csv", lambda path: recording.by_numpy(path) + 1.0)
+    with pytest.raises(SystemExit, match="csv and float and read_track do not read the same"):
+        recording.measure(GLANCE, QUIET)
 
 
 def test_training():

@@ -38,10 +38,15 @@ FLOORS = {
     "agents.sb3": 7,  # adapts the vector environment
     "wsn_env.evaluation": 7,
     "wsn_env.scoring": 7,
+    "wsn_env.recorded_evaluation": 8,
     "wsn_env.ray_engine": 7,
     "wsn_env.reports": 7,
     "wsn_env.front": 7,
     "wsn_env.front_report": 7,
+    "wsn_env.bluetooth": 1,
+    "wsn_env.bluetooth.calibration": 7,
+    "wsn_env.bluetooth.residual_map": 7,
+    "wsn_env.bluetooth.calibration_report": 8,
     "agents.tuning": 8,  # it compares policies
     "wsn_env.papers": 8,
     "benchmarks": 8,

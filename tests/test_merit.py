@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from tests.worlds import sensors_of
 from wsn_env import Scenario, View, World
 from wsn_env.compiling import kernel
 from wsn_env.interface.actions import MenuAction
@@ -15,8 +16,8 @@ MOVE_WITH_ALL = 18  # the best node leads, the next eight follow
 
 
 @kernel
-def gain_of(cs, positions, node, mean, cov):
-    return gain(1.0, positions, node, mean, cov, cov[0, 0], cov[0, 2], cov[2, 2], cs[0])
+def gain_of(cs, sensors, node, mean, cov):
+    return gain(1.0, sensors, node, mean, cov, cov[0, 0], cov[0, 2], cov[2, 2], cs[0])
 
 
 def view_of(scenario, mean, cov):
@@ -83,6 +84,6 @@ def test_a_bit_is_worth_the_variance_that_it_takes_away(offset):
         mass = density[side].sum()
         middle = (x[side] * density[side]).sum() / mass
         kept += ((x[side] - middle) ** 2 * density[side]).sum()
-    drop, p00, p01, p11 = gain_of(constants(scenario), np.array(scenario.field.positions), 0, mean, cov)
+    drop, p00, p01, p11 = gain_of(constants(scenario), sensors_of(np.array(scenario.field.positions)), 0, mean, cov)
     assert drop == pytest.approx(sd**2 - kept * (x[1] - x[0]), rel=2e-3)
     assert p00 == pytest.approx(sd**2 - drop) and p11 == pytest.approx(4.0) and abs(p01) < 1e-9

@@ -1,6 +1,7 @@
 """The strong hand-written rules: information order, size by spread, information for energy; and how they are tuned."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -32,7 +33,7 @@ def positions_view():
 
 
 def with_lam(view, lam):
-    other = View(view.row.copy(), view.belief, view.network, view.reports)
+    other = replace(view, row=view.row.copy(), _nearest={})
     other.row["lam"] = lam
     return other
 
@@ -69,7 +70,7 @@ def test_the_head_stays_within_the_hysteresis(view, order):
 
 def test_where_nodes_report_positions_and_the_belief_is_round_the_orders_are_the_same(positions_view):
     """Who is most likely to detect tells most, and that is the nearest."""
-    view = View(positions_view.row, positions_view.belief.copy(), positions_view.network, positions_view.reports)
+    view = replace(positions_view, belief=positions_view.belief.copy(), _nearest={})
     view.belief["predicted_cov"] = np.diag([2.0, 1.0, 2.0, 1.0])
     for hysteresis_m in (0.0, 5.0):
         a, b = (Nearest(SCENARIO, 4, hysteresis_m, order).act(view) for order in ORDERS)

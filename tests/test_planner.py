@@ -7,6 +7,7 @@ from agents.imagined import GaussianTracker, draw_worlds, imagined_world, place_
 from agents.nearest import ORDERS, Nearest
 from agents.planner import Planner, main
 from tests.test_policies import SCENARIO, chosen, walked
+from tests.worlds import sensors_of
 from wsn_env import Scenario, View, World, draws, evaluate
 from wsn_env.interface.merit import gain
 from wsn_env.physics.constants import constants
@@ -128,7 +129,7 @@ def test_the_dead_are_passed_over():
         assert all(view.alive[row, node] for node in nodes_of(view, cluster, row) - {view.head[row]})
 
 
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("name", [name for name in PRESETS if name != "Ble-v0"])
 def test_every_scenario_can_be_planned(name):
     scenario = Scenario.named(name, particles=50, periods=8)
     world, planner = World(scenario, threads=1), Planner(scenario, horizon=2, worlds=4)
@@ -142,6 +143,8 @@ def test_bad_parameters_are_named():
     for wrong in (dict(horizon=0), dict(worlds=3), dict(doubt=-1.0), dict(discount=0.0), dict(particles=-1)):
         with pytest.raises(ScenarioError, match=f"Planner.{next(iter(wrong))} ="):
             Planner(**wrong)
+    with pytest.raises(ValueError, match="Scenario.measurement = Beacon: planner cannot"):
+        Planner(Scenario.named("Ble-v0"))
     binary = Scenario.named("Binary-v0", particles=50)
     with pytest.raises(ValueError, match="particles = 0: must be at least 2"):
         Planner(binary, particles=0).act(View.of(World(binary, threads=1).reset([1])))
@@ -228,6 +231,12 @@ def test_a_strength_tells_the_gaussian_tracker_what_its_information_says():
         own = state.belief.row[row]
         m, p = own["predicted_mean"], own["predicted_cov"]
         told = gain(
-            1.0, state.network.positions[row], nodes[row, 2], m, p, p[0, 0], p[0, 2], p[2, 2], constants(RSSI)[0]
+            1.0,
+            sensors_of(state.network.positions[row]),
+            nodes[row, 2],
+            m,
+            p,
+            *p[[0, 0, 2], [0, 2, 2]],
+            constants(RSSI)[0],
         )
         np.testing.assert_allclose([own["cov"][0, 0], own["cov"][0, 2], own["cov"][2, 2]], told[1:], rtol=1e-9)

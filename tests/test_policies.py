@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import textwrap
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -42,7 +43,7 @@ def chosen(cluster: Cluster, row: int) -> set[int]:
 def test_every_name_is_an_entry_point():
     expected = {f"{family}{n}" for family in ("nearest", "informed") for n in range(9)}
     expected |= set("adaptive adaptive_informed greedy pre_dc boundary centroid static_cluster".split())
-    expected |= set("strongest_signal random all planner ppo".split())
+    expected |= set("strongest_signal strongest quadrants every random all planner ppo".split())
     assert expected <= set(policy_names())
     with pytest.raises(ValueError, match="did you mean pre_dc"):
         make_policy("predc", SCENARIO)
@@ -87,7 +88,7 @@ def test_pre_dc_passes_over_a_head_without_energy(view):
     battery = view.battery.copy()
     battery[np.arange(40), nearest] = 1e-6  # alive, but a handover costs more
     poor = View.of(walked())
-    poor = View(poor.row, poor.belief, poor.network._replace(battery=battery), poor.reports)
+    poor = replace(poor, network=poor.network._replace(battery=battery), _nearest={})
     head = PreDC(SCENARIO, phi0_m=1e-9).act(poor).head
     assert (head != nearest).all()
     assert (head == poor.nearest(2)[0][:, 1]).all()
@@ -122,7 +123,7 @@ def test_boundary_wakes_the_ring():
     view = View.of(walked(5, scenario, "boundary"))
     dead = view.battery.copy()
     dead[:, ::3] = 0.0
-    view = View(view.row, view.belief, view.network._replace(battery=dead), view.reports)
+    view = replace(view, network=view.network._replace(battery=dead), _nearest={})
     cluster = Boundary(scenario, width_m=4.0, sds=2.0).act(view)
     for row in range(40):
         speed = np.hypot(*view.predicted_mean[row, 1::2])
@@ -179,7 +180,7 @@ def test_nearest_counts_further_members_and_keeps_its_head(view, n):
 
 def test_a_policy_that_says_so_does_not_look_at_lam(view):
     """An evaluation plays it once for all lams. What says nothing counts as looking."""
-    other = View(view.row.copy(), view.belief, view.network, view.reports)
+    other = replace(view, row=view.row.copy(), _nearest={})
     other.row["lam"] = np.geomspace(0.01, 1000, 40)
     seeing = set()
     for name in policy_names():

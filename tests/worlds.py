@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from wsn_env import Cluster, Scenario, World
 from wsn_env.sections import BOUNDARY_TRACKERS, MEASUREMENTS, READS
+from wsn_env.types import RECEIVER, Sensors
 
 TRACKERS = ("particle", "particle", "particle", "ekf", "ukf", "ickf", "snapshot", *BOUNDARY_TRACKERS)
 MOTIONS = ["crossing", "straight", "sine", "circle", "turns", "waypoint"]
@@ -54,10 +55,14 @@ def scenarios(draw, trackers=TRACKERS, modem_hops_m=(30.0, 70.0, 250.0), **fixed
         overrides |= draw(binary_sensors(tracker))
     if tracker == "particle":
         overrides |= draw(cloud(measurement))
+    if measurement == "beacon":
+        overrides |= draw(beacon(overrides["nodes"]))
     if tracker in BOUNDARY_TRACKERS:
         overrides["gate_m"] = draw(st.sampled_from([None, None, 2.0, 20.0]))
     if draw(st.booleans()):
         overrides |= dict(layout="grid", nodes=isqrt(overrides["nodes"]) ** 2, jitter=draw(st.sampled_from([0.25, 0])))
+    if isinstance(overrides.get("at_1m_db"), tuple):
+        overrides["at_1m_db"] = overrides["at_1m_db"][: overrides["nodes"]]
     overrides |= fixed
     if draw(st.sampled_from([False, False, True])):
         overrides |= dict(radio="modem", hop_m=draw(st.sampled_from(modem_hops_m)), receiver="head")
@@ -90,6 +95,26 @@ def binary_sensors(draw, tracker):
 
 
 @st.composite
+def beacon(draw, nodes):
+    """A beacon's receivers, alike or each its own, and a filter that walks or not."""
+    own = tuple(-50.0 - i % 20 for i in range(nodes))
+    return dict(
+        at_1m_db=draw(st.sampled_from([-60.0, own])),
+        heights_m=draw(st.sampled_from([0.0, 2.3])),
+        field_db=draw(st.sampled_from([2.24, 0.0])),
+        loss=draw(st.sampled_from([0.146, 0.0, 0.7])),
+        loss_after_loss=draw(st.sampled_from([0.8, 0.6])),
+        interval_s=draw(st.sampled_from([0.4525, 1.7])),
+        temper=draw(st.sampled_from([1.0, 0.3])),
+        velocity_s=draw(st.sampled_from([None, 5.0])),
+        motion=draw(st.sampled_from(["waypoint", "walk", "straight"])),
+        fusion="joint",
+        silent_information=False,
+        search=False,
+    )
+
+
+@st.composite
 def cloud(draw, measurement):
     """What the particle filter alone has; a bitmap tells of silence anyhow."""
     return dict(
@@ -107,6 +132,11 @@ def choices(seed, period, rows, nodes):
     wild = rng.random() < 0.3
     low, high = (-3, nodes + 3) if wild else (-1, nodes)
     return Cluster(rng.integers(low, high, rows), rng.integers(low, high, (rows, width)))
+
+
+def sensors_of(positions):
+    """Nodes (S, 2) that hear no beacon, as orders of merit take them."""
+    return Sensors(positions, np.zeros(0, RECEIVER))
 
 
 def keys_of(seed, rows):

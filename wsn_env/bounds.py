@@ -50,9 +50,10 @@ def bound_kind(scenario: Scenario) -> str:
     - who reports and who keeps silent tells something beside the values: with a threshold on the level, and for
       silent members with `silent_information`.
 
-    "none": binary sensors. A bit that jumps at an edge has no Fisher information.
+    "none": binary sensors, since a bit that jumps at an edge has no Fisher information; and a beacon's levels, whose
+    errors last over periods.
     """
-    if scenario.binary:
+    if scenario.binary or scenario.hears:
         return "none"
     own_noise = isinstance(scenario.motion, (Crossing, Cruise))
     tells_more = scenario.tracking.silent_information or isinstance(scenario.detection, Threshold)
@@ -80,8 +81,9 @@ class Bound:
             rows: B.
             threads: at most so many share the work. No bit depends on it.
         """
-        if scenario.binary:
-            raise ValueError("Scenario.measurement = Binary: has no Cramer-Rao bound; allowed are all others")
+        if bound_kind(scenario) == "none":
+            kind = type(scenario.measurement).__name__
+            raise ValueError(f"Scenario.measurement = {kind}: has no Cramer-Rao bound; allowed are all others")
         self.kind = bound_kind(scenario)
         self._periods, self._threads = scenario.periods, threads
         self._constants, self._start = constants(scenario), start_record(scenario)

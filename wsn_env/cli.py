@@ -1,4 +1,4 @@
-"""The command `wsn`, also `python -m wsn_env`: evaluate, reproduce, compile."""
+"""The command `wsn`, also `python -m wsn_env`: evaluate, calibrate, reproduce, compile."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 import tyro
 
 from wsn_env.progress import progress_bar
+from wsn_env.quantity import parse_overrides
 from wsn_env.scenario import Scenario
 
 
@@ -30,11 +31,12 @@ class Evaluate:
     """The fronts of error against energy over the lams, their hypervolumes with paired differences, and front.csv,
     .json and .png. Name the policy of interest first: it is compared with each other and with all others together."""
     episodes: int = 100
-    """Episodes for each policy and lam."""
+    """Episodes for each policy and lam; of a recorded dataset, filter seeds for each track."""
     seed: int = 0
     """Which episodes: evaluation seeds are 2^31 + seed * 10^5 + episode."""
     tracks: list[Path] = field(default_factory=list)
-    """CSV files of recorded motion (t, x, y in s and m) instead of the scenario's motion."""
+    """CSV files of recorded motion (t, x, y in s and m) instead of the scenario's motion. With Ble-v0 the folder of a
+    published Bluetooth dataset: each track is replayed, calibrated on the others (or by --set calibration=FILE)."""
     set: list[str] = field(default_factory=list)
     """Scenario quantities, as name=value: nodes=400 particles=1000 tracker=ekf."""
     engine: Literal["local", "ray"] = "local"
@@ -43,6 +45,21 @@ class Evaluate:
     """Of a running Ray cluster, such as auto or HOST:6379; left out: one on this machine."""
     out: Path | None = None
     """Folder for the files; left out: only the table. A run that was stopped continues from it."""
+
+
+@dataclass
+class Calibrate:
+    """Fit receivers, noise and losses to recorded Bluetooth tracks: parameter files for --set calibration=FILE, and a
+    report."""
+
+    tracks: Path
+    """Folder of the published format: tetam.dev and *.mbd."""
+    out: Path
+    """Folder for calibration.json, without_TRACK.json for each track left out, calibration.md and .png."""
+    leave_out: str | None = None
+    """Calibrate without this track only; left out: all together, and without each one."""
+    maps: bool = False
+    """Maps of what each receiver's level is off by, too (Gaussian process regression)."""
 
 
 @dataclass
@@ -64,7 +81,7 @@ class Compile:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; bad input is one line on stderr and exit status 2, Ctrl-C is 130."""
-    runs = {Evaluate: run_evaluate, Reproduce: run_reproduce, Compile: run_compile}
+    runs = {Evaluate: run_evaluate, Calibrate: run_calibrate, Reproduce: run_reproduce, Compile: run_compile}
     commands = {kind.__name__.lower(): kind for kind in runs}
     command = tyro.extras.subcommand_cli_from_dict(commands, prog="wsn", args=arguments)
     try:
@@ -89,6 +106,9 @@ def run_evaluate(command: Evaluate) -> None:
 
     if command.address and command.engine != "ray":
         raise ValueError(f"--address {command.address}: only with --engine ray")
+    if command.tracks and Scenario.named(command.scenario).hears:
+        run_evaluate_recorded(command)
+        return
     scenario = make_scenario(command.scenario, command.set, command.tracks)
     lams = command.lam
     if command.pareto:
@@ -115,6 +135,39 @@ def run_evaluate(command: Evaluate) -> None:
         forget_blocks(command.out)
         names = ("evaluation.csv", "evaluation.json", *(FRONT_FILES if command.pareto else ()))
         print(f"written: {', '.join(str(command.out / name) for name in names)}")
+
+
+def run_evaluate_recorded(command: Evaluate) -> None:
+    """`wsn evaluate --scenario Ble-v0 --tracks FOLDER`."""
+    from wsn_env import recorded_evaluation
+    from wsn_env.ray_engine import on_ray
+
+    if command.pareto or len(command.tracks) != 1:
+        raise ValueError("--tracks: must be one folder with tetam.dev and *.mbd, without --pareto")
+    with progress_bar() as report:
+        evaluation = recorded_evaluation.evaluate_recorded(
+            command.policies,
+            make_scenario(command.scenario, command.set, []),
+            command.tracks[0],
+            command.lam,
+            command.episodes,
+            command.seed,
+            keep=command.out,
+            progress=report,
+            engine=on_ray(command.address) if command.engine == "ray" else None,
+            calibrated=any(pair.startswith("calibration=") for pair in command.set),
+        )
+    recorded_evaluation.print_recorded(evaluation)
+    if command.out:
+        recorded_evaluation.save_recorded(evaluation, command.out)
+        print(f"written: {', '.join(str(command.out / name) for name in recorded_evaluation.FILES)}")
+
+
+def run_calibrate(command: Calibrate) -> None:
+    """`wsn calibrate`."""
+    from wsn_env.bluetooth.calibration_report import run_calibrate
+
+    run_calibrate(command.tracks, command.out, command.leave_out, command.maps)
 
 
 def run_reproduce(command: Reproduce) -> None:
@@ -154,23 +207,3 @@ def make_scenario(name: str, pairs: list[str], tracks: list[Path], **further) ->
     """A scenario from the options --scenario, --set and --tracks; `further` quantities win."""
     recorded = {"motion": "recorded", "tracks": tuple(map(str, tracks))} if tracks else {}
     return Scenario.named(name, **parse_overrides(pairs) | recorded | further)
-
-
-def parse_overrides(pairs: list[str]) -> dict:
-    """{"nodes": 400} from ["nodes=400"]; values are numbers, true/false, none, or words."""
-    overrides = {}
-    for pair in pairs:
-        name, equals, text = pair.partition("=")
-        if not equals:
-            raise ValueError(f"--set {pair!r}: must be name=value")
-        words = {"true": True, "false": False, "none": None}
-        value = words.get(text.lower(), text)
-        if value is text:
-            for kind in (int, float):
-                try:
-                    value = kind(text)
-                    break
-                except ValueError:
-                    continue
-        overrides[name] = value
-    return overrides

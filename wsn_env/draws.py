@@ -17,6 +17,7 @@ from wsn_env.numerics import HALF_PI, F, f32_bits, f32_from_bits, log, log32, si
 # Purposes, one a use: adding one changes no other draw.
 FIELD, START, TRACK, LAM, DETECTION, MEASUREMENT, PACKET, PROCESS, RESAMPLING, RESTART, POLICY, CLOUD = range(12)
 SEARCH_PACKET, SPREAD, HANDOVER, MISREADING = range(12, 16)
+BEACON_FIELD, BEACON_DRIFT, BEACON_NOISE, BEACON_LOSS = range(16, 20)  # of receivers, for whole episodes
 
 GOLDEN = uint64(0x9E3779B97F4A7C15)
 MIX_1, MIX_2 = uint64(0xBF58476D1CE4E5B9), uint64(0x94D049BB133111EB)

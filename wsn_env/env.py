@@ -89,13 +89,14 @@ class ClusterEnv(gym.Env):
         cluster = self.interface.action.cluster(_batched(action), self._view)
         self._state, outcome = self.world.step(self._state, cluster, donate=True)
         reward, info = self._judge(outcome)
-        self._squares += info["error_m"] * info["error_m"]
+        if self._state.period[0] > self.scenario.unscored:
+            self._squares += info["error_m"] * info["error_m"]
         self._detections += info["detections"]
         if self._bound is not None:
             info["bound_m"] = self._bound.advance(self._state, outcome).item()
         truncated = self._state.period.item() >= self.scenario.periods
         if truncated:
-            info["episode_rms_m"] = math.sqrt(self._squares / self.scenario.periods)
+            info["episode_rms_m"] = math.sqrt(self._squares / self.scenario.scored)
             info["antnp"] = self._detections / self.scenario.periods
             if self._bound is not None:
                 info["episode_bound_m"] = self._bound.episode_m().item()

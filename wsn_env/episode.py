@@ -5,6 +5,7 @@ import numpy as np
 from wsn_env import draws
 from wsn_env.compiling import kernel, piece
 from wsn_env.numerics import exp, log
+from wsn_env.physics.beacon import beacon_record, draw_packets, receivers_of, recorded_packets
 from wsn_env.physics.field import index_nodes, lay_out, scatter
 from wsn_env.physics.motion import draw_track
 from wsn_env.physics.radio import close_books
@@ -48,8 +49,15 @@ def placed_nodes(scenario: Scenario) -> np.ndarray:
     return np.empty((0, 2)) if positions is None else np.array(positions)
 
 
+def beacon_of(scenario: Scenario) -> tuple[np.ndarray, ...]:
+    """What `begin` needs of a beacon: its record, its receivers (S, 3), recorded packets; empty where there is none."""
+    return beacon_record(scenario), receivers_of(scenario), recorded_packets(scenario)
+
+
 @kernel
-def begin(start, stop, cs, rows, keys, motion, numbers, recordings, starts, placed, state):
+def begin(
+    start, stop, cs, rows, keys, motion, numbers, recordings, starts, placed, beacons, receivers, recorded, state
+):
     """Field, track, batteries, lam and the first belief of new episodes."""
     c, s = cs[0], starts[0]
     for b in range(start, stop):
@@ -83,8 +91,24 @@ def begin(start, stop, cs, rows, keys, motion, numbers, recordings, starts, plac
         belief.n_eff = state.belief.particles.shape[2]
         track_stream = draws.stream(key, 0, draws.TRACK)
         draw_track(motion, numbers, recordings, track_stream, c.period_s, c.side_m, state.track[b])
+        if len(receivers) > 0:
+            if len(recorded) > 0:
+                state.packets[b] = recorded
+            else:
+                at = network.positions[b], receivers, c.period_s, beacons[0]
+                draw_packets(key, state.track[b], *at, state.packets[b])
+            _know_nothing(receivers, c, state.belief.receivers[b], state.belief.biases[b])
         _first_belief(draws.stream(key, 0, draws.START), state.track[b, 0], s, c, belief.mean, belief.cov)
         belief.predicted_mean[:] = belief.mean  # where a first search takes the target to be
+
+
+@piece
+def _know_nothing(receivers, c, known, biases):
+    for j in range(len(receivers)):
+        known[j].at_1m_db, known[j].slope, known[j].height_m2 = receivers[j, 0], receivers[j, 1], receivers[j, 2]
+        known[j].bias_variance = c.bias_variance
+        known[j].latest_db = 0.0
+    biases[:] = np.float32(0.0)
 
 
 @piece
@@ -93,6 +117,8 @@ def _first_belief(stream, truth, s, c, mean, cov):
     cov[:] = 0.0
     for axis in range(4):
         cov[axis, axis] = s.sd_m**2 if axis % 2 == 0 else s.sd_ms**2
+    if not s.known:
+        cov[2, 2] = (s.sd_m * c.depth_m / c.side_m) ** 2
     if s.known:
         ex, ey = draws.normal_pair(stream, 0)
         evx, evy = draws.normal_pair(stream, 1)
@@ -103,4 +129,4 @@ def _first_belief(stream, truth, s, c, mean, cov):
     else:
         mean[:] = 0.0
         mean[0] = 0.5 * c.side_m
-        mean[2] = 0.5 * c.side_m
+        mean[2] = 0.5 * c.depth_m

@@ -39,7 +39,7 @@ BLOCK = 50
 FIRST_SEED, SEEDS_PER_RUN = 2**31, 10**5  # training seeds lie below FIRST_SEED
 COLUMNS = (
     "policy scenario lam episode seed periods return error_m rms_m energy_mj members handovers searches lost"
-    " bound_m floor_m"
+    " bound_m floor_m anees"
 ).split()
 MEANS = ("return", "rms_m", "error_m", "energy_mj", "members", "handovers", "searches", "lost")
 BLOCKS_FILE = "evaluation.blocks.jsonl"
@@ -172,14 +172,21 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict]:
         world: of a scenario with one lam.
         seeds: reset seeds, one a row.
 
-    Returns: the measured columns of each episode, and the sums that its return is made of.
+    Returns: the measured columns of each episode, and the sums that its return is made of. `anees` is the mean of the
+    squared error over what the belief takes it to be, the trace of its position covariance: 1 where the filter is
+    honest, more where it is too sure.
     """
     scenario = world.scenario
     sums = dict.fromkeys(("error", "square", "energy", "members", "handovers", "searches", "lost"), 0.0)
+    judged, ratios = np.zeros(len(seeds)), np.zeros(len(seeds))
     bound = None if bound_kind(scenario) == "none" else Bound(scenario, len(seeds), world.threads)
     for state, outcome in episodes(policy, world, seeds, bound and bound.begin):
+        square, believed = outcome.error_m**2, outcome.posterior_rms_m**2
         sums["error"] += outcome.error_m
-        sums["square"] += outcome.error_m**2
+        if state.period[0] > scenario.unscored:
+            sums["square"] += square
+            judged += believed > 0
+            ratios += np.divide(square, believed, out=np.zeros(len(seeds)), where=believed > 0)
         sums["energy"] += outcome.energy_mj
         sums["members"] += outcome.members
         sums["handovers"] += outcome.handover
@@ -195,7 +202,7 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict]:
         "sum_error_m": sums["error"],
         "sum_energy_mj": sums["energy"],
         "error_m": sums["error"] / n,
-        "rms_m": np.sqrt(sums["square"] / n),
+        "rms_m": np.sqrt(sums["square"] / scenario.scored),
         "energy_mj": sums["energy"] / n,
         "members": sums["members"] / n,
         "handovers": sums["handovers"].astype(int),
@@ -203,6 +210,7 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict]:
         "lost": sums["lost"].astype(int),
         "bound_m": np.full(len(seeds), "") if bound is None else bound.episode_m(),
         "floor_m": np.full(len(seeds), "") if bound is None else bound.floor_m(state),
+        "anees": ratios / np.maximum(judged, 1),
     }
     return [{name: values[i].item() for name, values in columns.items()} for i in range(len(seeds))]
 
@@ -310,7 +318,8 @@ def evaluate(
 def _made(text: str, scenario: Scenario) -> tuple[str, Policy]:
     """("ppo", policy) from "ppo=runs/mine/policy.json"; a name or a path alone is its own label."""
     label, equals, source = text.partition("=")
-    return (label, make_policy(source, scenario)) if equals else (text, make_policy(text, scenario))
+    labelled = equals and ":" not in label  # else parameters: quadrants:n=2
+    return (label, make_policy(source, scenario)) if labelled else (text, make_policy(text, scenario))
 
 
 class _Kept:

@@ -4,16 +4,17 @@ import numpy as np
 
 from wsn_env import draws
 from wsn_env.compiling import kernel, lean_kernel, lean_piece
-from wsn_env.numerics import expected_error
+from wsn_env.numerics import expected_error, log
 from wsn_env.physics import radio, sensing
 from wsn_env.physics.field import nearest_living, squared_distance
-from wsn_env.physics.motion import predict_moments
+from wsn_env.physics.motion import predict_moments, predict_walk
 from wsn_env.trackers.kernels import filter_row, redraw_row, scratch
-from wsn_env.types import KEEP_CLUSTER, KEEP_HEAD, Outcome, state_of
+from wsn_env.trackers.levels import foretell
+from wsn_env.types import KEEP_CLUSTER, KEEP_HEAD, NOBODY, Outcome, state_of
 
 
 @kernel
-def run(start, stop, cs, heads, chosen, lost, outcomes, *arrays):
+def run(start, stop, cs, maps, heads, chosen, lost, outcomes, *arrays):
     """A period with the particle filter at the head, up to where some rows must search; returns how many."""
     state = state_of(arrays)
     outcome = Outcome(outcomes, state.ledger.spent_j)
@@ -24,10 +25,21 @@ def run(start, stop, cs, heads, chosen, lost, outcomes, *arrays):
         key, period = state.key[b], state.row[b].period
         if cs[0].redraw and outcome.row[b].handover:
             redraw_row(key, period, state.belief, b)
-        resampled = filter_row(key, period, state.belief, state.network, state.reports, b, cs[0], room)
+        resampled = filter_row(key, period, state.belief, state.network, state.reports, b, cs[0], maps, room)
         lost[b] = _conclude(resampled, state, outcome, b, cs[0])
         count += lost[b]
+        if cs[0].model == sensing.BEACON:
+            foretell(state.belief, state.network.positions[b], b, cs[0], maps, room[0])
     return count
+
+
+@kernel
+def foretell_rows(start, stop, cs, rows, maps, belief, positions):
+    """What the receivers of a beacon should report next, in the rows marked."""
+    room = np.empty(belief.particles.shape[2], np.float32)
+    for b in range(start, stop):
+        if rows[b]:
+            foretell(belief, positions[b], b, cs[0], maps, room)
 
 
 @lean_kernel
@@ -89,6 +101,10 @@ def _take_choice(head, chosen, state, outcome, b, c):
     stands = standing.head >= 0 and battery[standing.head] > 0.0
     if head == KEEP_CLUSTER and stands:
         out.members = 1 + standing.n_members
+        return
+    if head == NOBODY and c.receiver != radio.TO_HEAD:
+        standing.head = -1
+        standing.n_members = 0
         return
     wanted = 0
     for node in chosen:
@@ -163,6 +179,9 @@ def sense(node, head, purpose, target, state, outcome, b, c):
     key, period = state.key[b], state.row[b].period
     if battery[node] <= 0.0:
         return
+    if c.model == sensing.BEACON:
+        _pass_on(node, head, purpose, state, outcome, b, c)
+        return
     squared = squared_distance(positions, node, target[0], target[1])
     value = sensing.tells(key, period, node, squared, c)
     has_news, changed = value, False
@@ -171,7 +190,7 @@ def sense(node, head, purpose, target, state, outcome, b, c):
     if not has_news:
         return
     outcome.row[b].detections += 1
-    if radio.report(node, head, purpose, state, outcome, b, c):
+    if radio.report(node, head, 1.0, purpose, state, outcome, b, c):
         slot = reports.count[b]
         reports.node[b, slot] = node
         if c.model == sensing.BINARY:
@@ -181,6 +200,20 @@ def sense(node, head, purpose, target, state, outcome, b, c):
         else:
             sensing.measure(key, period, node, positions, target, c, reports.value[b, slot])
         reports.count[b] += 1
+
+
+@lean_piece
+def _pass_on(node, head, purpose, state, outcome, b, c):
+    """A receiver's period: it reports the packets that it has heard."""
+    reports, heard = state.reports, state.packets[b, min(state.row[b].period, state.packets.shape[1] - 1), node]
+    if heard[1] > 0.0:
+        outcome.row[b].detections += 1
+        if radio.report(node, head, np.float64(heard[1]), purpose, state, outcome, b, c):
+            slot = reports.count[b]
+            reports.node[b, slot] = node
+            reports.value[b, slot, 0] = heard[0]
+            reports.value[b, slot, 1] = heard[1]
+            reports.count[b] += 1
 
 
 @lean_piece
@@ -203,6 +236,10 @@ def _remember_miss(state, b, c):
     """How improbable the silence since the last report is, seen from the belief."""
     if _hears_of_target(state, b, c):
         state.row[b].log_miss = 0.0
+    elif c.model == sensing.BEACON:  # a receiver hears it anywhere
+        standing = state.network.row[b]
+        awake = standing.n_members + (standing.head >= 0)
+        state.row[b].log_miss += awake * log(max(1.0 - c.heard, 1e-12))
     else:
         network, belief = state.network, state.belief.row[b]
         standing = network.row[b]
@@ -282,7 +319,10 @@ def _settle(state, outcome, b, c):
     out.alive = state.network.row[b].alive
     luck = draws.bits(draws.stream(state.key[b], state.row[b].period, draws.POLICY), 0)
     state.row[b].luck = np.uint32(luck >> np.uint64(32))
-    predict_moments(mean, cov, c.period_s, c.q, belief.predicted_mean, belief.predicted_cov)
+    if c.walks:
+        predict_walk(mean, cov, c, belief.predicted_mean, belief.predicted_cov)
+    else:
+        predict_moments(mean, cov, c.period_s, c.q, belief.predicted_mean, belief.predicted_cov)
 
 
 @lean_piece

@@ -11,7 +11,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Protocol
 
-from wsn_env.quantity import suggest
+from wsn_env.quantity import parse_overrides, suggest
 from wsn_env.scenario import Scenario
 from wsn_env.types import Cluster
 from wsn_env.view import View
@@ -35,16 +35,24 @@ def make_policy(name: str, scenario: Scenario, **parameters) -> Policy:
     """A policy by name, or a learned one from the policy.json that train.py saved.
 
     Args:
-        name: an entry point's name, or a path to a policy.json (or its folder).
+        name: an entry point's name, with parameters after a colon if any ("pre_dc:theta=0.8,phi0_m=3"), or a path to a
+            policy.json (or its folder).
         scenario: what it will act in.
         parameters: of the policy, for example `make_policy("pre_dc", scenario, theta=0.8)`.
 
     Raises:
-        ValueError: for an unknown name.
+        ValueError: for an unknown name or parameter.
     """
+    plain, colon, text = name.partition(":")
     for point in entry_points(group=GROUP):
-        if point.name == name:
-            return point.load()(scenario=scenario, **parameters)
+        if point.name == plain:
+            given = parse_overrides(text.split(",")) if colon else {}
+            try:
+                return point.load()(scenario=scenario, **parameters | given)
+            except TypeError as problem:
+                if not given:
+                    raise
+                raise ValueError(f"policy {name!r}: {problem}") from None
     path = Path(name)
     path = path / "policy.json" if path.is_dir() else path
     if path.suffix == ".json":

@@ -82,3 +82,23 @@ def suggest(name: str, known) -> str:
     known = sorted(map(str, known))
     near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
     return f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(known)}"
+
+
+def parse_overrides(pairs) -> dict:
+    """{"nodes": 400} from ["nodes=400"]; values are numbers, true/false, none, or words."""
+    overrides = {}
+    for pair in pairs:
+        name, equals, text = pair.partition("=")
+        if not equals:
+            raise ValueError(f"{pair!r}: must be name=value")
+        words = {"true": True, "false": False, "none": None}
+        value = words.get(text.lower(), text)
+        if value is text:
+            for kind in (int, float):
+                try:
+                    value = kind(text)
+                    break
+                except ValueError:
+                    continue
+        overrides[name] = value
+    return overrides

@@ -2,7 +2,7 @@
 
 from gymnasium.envs.registration import register, registry
 
-IDS = ("PreDC-v0", "Rssi-v0", "Binary-v0", "Anchors-v0", "Underwater-v0")
+IDS = ("PreDC-v0", "Rssi-v0", "Binary-v0", "Anchors-v0", "Underwater-v0", "Ble-v0")
 
 
 def register_envs() -> None:

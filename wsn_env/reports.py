@@ -25,6 +25,8 @@ def about_the_bound(evaluation: Evaluation) -> str:
     """What the column of the bound holds, in a sentence."""
     floor = evaluation.floor_m()
     if floor is None:
+        if evaluation.scenario.hears:
+            return "no Cramer-Rao bound: the errors of a beacon's levels last over periods"
         return "no Cramer-Rao bound: a bit that jumps at an edge has no Fisher information"
     what = {
         "bound": "posterior Cramer-Rao bound of the reports delivered",
@@ -97,10 +99,8 @@ def print_tables(evaluation: Evaluation, reference: str | None = None, console=N
 
 def markdown_table(evaluation: Evaluation, lam: float, reference: str) -> str:
     """The same as Markdown."""
-    lines = [
-        "| " + " | ".join(table_header(evaluation, reference)) + " |",
-        "|---" + "|--:" * (len(HEADER) - 1) + "|",
-    ]
+    header = table_header(evaluation, reference)
+    lines = ["| " + " | ".join(header) + " |", "|---" + "|--:" * (len(header) - 1) + "|"]
     return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in table_rows(evaluation, lam, reference)]) + "\n"
 
 

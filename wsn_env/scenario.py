@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from wsn_env.bluetooth.replay import periods_of, read_quantities
 from wsn_env.quantity import NUMBERS, ScenarioError, Section, quantity, suggest
 from wsn_env.sections import (
     BOUNDARY_TRACKERS,
@@ -16,7 +17,9 @@ from wsn_env.sections import (
     MOTIONS,
     RADIOS,
     READS,
+    Beacon,
     Binary,
+    Bluetooth,
     Crossing,
     Cruise,
     Detection,
@@ -27,13 +30,30 @@ from wsn_env.sections import (
     Motion,
     Position,
     Radio,
+    Replay,
     Rssi,
     Sonar,
     Threshold,
     Tracking,
+    Walk,
 )
 
 RING_OF_EIGHT = tuple((x, y) for y in (0.0, 100.0, 200.0) for x in (0.0, 100.0, 200.0) if (x, y) != (100.0, 100.0))
+
+DONGLES = (  # m, in the order of the dataset's file
+    (7.00, 7.09),
+    (7.18, 0.68),
+    (0.71, 6.16),
+    (7.25, 11.36),
+    (0.76, 12.13),
+    (7.18, 17.64),
+    (13.14, 12.33),
+    (12.82, 16.83),
+    (18.12, 11.93),
+    (13.01, 5.51),
+    (17.77, 6.33),
+    (12.76, 0.27),
+)
 
 KINDS = {
     "name": (str,),
@@ -57,6 +77,7 @@ class Scenario(Section):
     lam: float | tuple[float, float] = 4.0  # m/mJ; a pair (low, high): drawn log-uniformly for each episode
     typical_error_m: float = quantity(1.0, "error of a good schedule: the scale of a learner's rewards", above=0)
     typical_energy_mj: float = quantity(0.3, "its energy in a period", above=0)
+    unscored: int = quantity(0, "periods at the start that rms_m leaves out: acquisition", at_least=0, whole=True)
     # The hypervolume's reference point: the error of the head alone, the energy of every node within sensing range,
     # both measured (nearest0; static_cluster or the scenario's own policy) and rounded up past their intervals.
     reference_error_m: float = quantity(1.5, "mean error that a point of a front must stay below", above=0)
@@ -74,12 +95,22 @@ class Scenario(Section):
             value = getattr(self, name)
             if not isinstance(value, kinds):
                 raise ScenarioError(f"Scenario.{name} = {value!r}: must be a {' or '.join(k.__name__ for k in kinds)}")
+        if self.unscored >= self.periods:
+            raise ScenarioError(f"Scenario.unscored = {self.unscored}: must be below periods = {self.periods}")
         self._check_tracker()
         low, high = self.lam_range
         if not (np.isfinite([low, high]).all() and 0 <= low <= high) or (low == 0) != (high == 0):
             raise ScenarioError(f"Scenario.lam = {self.lam!r}: must be at least 0 m/mJ, or a pair 0 < low <= high")
         if isinstance(self.detection, Threshold):
             self.detection.check(self.measurement)
+        if isinstance(self.measurement, Beacon):
+            self.measurement.of_nodes(self.field.nodes)
+            if self.tracking.search:
+                raise ScenarioError("Tracking.search = True: allowed is False with Beacon levels")
+        elif isinstance(self.motion, Replay):
+            raise ScenarioError(
+                f"Scenario.measurement = {type(self.measurement).__name__}: must be Beacon with the motion 'replay'"
+            )
         if isinstance(self.radio, Modem) and self.period_s < self.radio.report_s:
             raise ScenarioError(
                 f"Scenario.period_s = {self.period_s}: must be at least {self.radio.report_s:.3g} s, until a report of"
@@ -102,6 +133,7 @@ class Scenario(Section):
             "silent_information": name != "particle",
             "resampling": name != "particle",
             "redraw_on_handover": name != "particle",
+            "velocity_s": name != "particle",
             "gate_m": name not in BOUNDARY_TRACKERS,
         }
         usual = {item.name: item.default for item in fields(self.tracking)}
@@ -114,6 +146,11 @@ class Scenario(Section):
             raise ScenarioError(
                 "Tracking.silent_information = True: allowed is False with Binary reports, whose bitmap already tells"
                 " who keeps silent"
+            )
+        if self.hears and (self.tracking.silent_information or self.tracking.fusion != "joint"):
+            raise ScenarioError(
+                f"Tracking.silent_information = {self.tracking.silent_information}, Tracking.fusion ="
+                f" {self.tracking.fusion!r}: allowed are False and 'joint' with Beacon levels"
             )
 
     @property
@@ -160,6 +197,11 @@ class Scenario(Section):
         return isinstance(self.measurement, Binary)
 
     @property
+    def hears(self) -> bool:
+        """Whether nodes report the levels of a beacon's packets."""
+        return isinstance(self.measurement, Beacon)
+
+    @property
     def ring_m(self) -> float:
         """How far from the target a node tells most: at the edge of detection for one bit, as near as may be else."""
         return self.radius_m if self.binary else 0.0
@@ -178,6 +220,11 @@ class Scenario(Section):
     def reach_m(self) -> float:
         """From here on a node detects nothing (with a threshold, less than once in a million periods)."""
         return self.detection.distances_m(self.measurement)[1]
+
+    @property
+    def scored(self) -> int:
+        """Periods that rms_m is made of."""
+        return self.periods - self.unscored
 
     @property
     def handover_bits(self) -> int:
@@ -206,8 +253,11 @@ class Scenario(Section):
         """A copy with some quantities changed, whatever section they stand in.
 
         Sections are given whole or, where there are several kinds, by name: `override(nodes=400, motion="sine",
-        amplitude_m=20, tracker="ekf")`. An unknown keyword raises and suggests.
+        amplitude_m=20, tracker="ekf")`. An unknown keyword raises and suggests. `calibration=FILE` stands for all
+        quantities that `wsn calibrate` wrote into the file. A replay without `periods` is as long as its recording.
         """
+        if "calibration" in changes:
+            changes = read_quantities(changes.pop("calibration")) | changes
         if changes.get("positions") is not None:
             changes.setdefault("nodes", Field.nodes)  # the positions tell how many
         whole = {}
@@ -234,6 +284,9 @@ class Scenario(Section):
         if changes:
             name = next(iter(changes))
             raise ScenarioError(f"scenario has no quantity {name!r}: {suggest(name, known)}")
+        motion = whole.get("motion")
+        if isinstance(motion, Replay) and motion != self.motion and "periods" not in whole:
+            whole["periods"] = periods_of(motion.recording, whole.get("period_s", self.period_s))
         return replace(self, **whole)  # at once: a tracker and what it reads may change together
 
     def quantities(self) -> dict[str, Any]:
@@ -310,6 +363,34 @@ PRESETS = {
             resampling="spread",
             start_sd_m=20.0,
             start_sd_ms=1.0,
+        ),
+    ),
+    # The twelve receivers, the hall and the noise of Danis, Naskali, Cemgil & Ersoy (2022), calibrated on six tracks.
+    "Ble-v0": Scenario(
+        name="Ble-v0",
+        lam=0.006,
+        typical_error_m=1.8,
+        typical_energy_mj=194.0,
+        reference_error_m=5.0,
+        reference_energy_mj=220.0,
+        unscored=3,
+        field=Field(side_m=20.66, depth_m=17.641, positions=DONGLES),
+        motion=Walk(),
+        detection=Detection(),
+        measurement=Beacon(
+            at_1m_db=(-60.1, -57.2, -58.8, -60.4, -61.8, -55.2, -64.3, -56.8, -61.3, -60.0, -56.7, -57.3),
+            exponents=(1.57, 1.80, 1.56, 1.70, 1.58, 1.95, 1.93, 1.74, 1.34, 2.19, 1.29, 1.79),
+            heights_m=(1.22, 2.30, 2.30) * 4,
+            beacon_m=1.8,
+        ),
+        radio=Bluetooth(),
+        tracking=Tracking(
+            particles=1000,
+            start="field",
+            rest_sd_ms=0.4,
+            velocity_s=10.0,
+            resample_below=0.6,
+            search=False,
         ),
     ),
 }

@@ -35,12 +35,29 @@ BELIEF = np.dtype(
 )
 
 
+RECEIVER = np.dtype(
+    [
+        ("at_1m_db", "f8"),  # its mean level: at_1m_db - slope ln(d^2 + height_m2)
+        ("slope", "f8"),
+        ("height_m2", "f8"),
+        ("bias_variance", "f8"),  # of its level about the mean, beside the packets' own noise, alike for all particles
+        ("latest_db", "f8"),  # last heard; SILENT_DB if it has listened since in vain; 0 before it ever has
+        ("gradient", "f8", 2),  # of the level to come by position, over the predicted belief [dB/m]
+        ("variance", "f8"),  # of what it should report, about that [dB^2]
+    ],
+    align=True,
+)
+SILENT_DB = -95.0
+
+
 class Belief(NamedTuple):
     """What the head believes about the target."""
 
     row: np.ndarray  # (B,) BELIEF
     particles: np.ndarray  # (B, 4, P) float32; P = 0 for trackers without
     log_weights: np.ndarray  # (B, P) float32, at most 0
+    receivers: np.ndarray  # (B, S) RECEIVER: what is believed of each receiver of a beacon; else (B, 0)
+    biases: np.ndarray  # (B, S, P) float32 dB: the mean of each receiver's bias if a particle is right; else (B, 0, P)
 
     __getattr__ = _of_row
 
@@ -50,7 +67,8 @@ class Reports(NamedTuple):
 
     count: np.ndarray  # (B,)
     node: np.ndarray  # (B, S) int32
-    value: np.ndarray  # (B, S, 2): x, y [m]; or the strength and 0; or the state, 1 or 0, and 1 if it has changed
+    value: np.ndarray  # (B, S, 2): x, y [m]; or the strength and 0; or the state, 1 or 0, and 1 if it has changed;
+    # or the mean level of a beacon's packets and how many they are
     bitmap: np.ndarray  # (B, S) int8: the state of each binary sensor as last reported; (B, 0) for other sensors
 
 
@@ -83,6 +101,13 @@ NETWORK = np.dtype(
     ],
     align=True,
 )
+
+
+class Sensors(NamedTuple):
+    """A row's nodes, for what is expected of them."""
+
+    positions: np.ndarray  # (S, 2) m
+    receivers: np.ndarray  # (S,) RECEIVER; else (0,)
 
 
 class Network(NamedTuple):
@@ -132,6 +157,10 @@ class State(NamedTuple):
 
     key: np.ndarray  # (B,) uint64: all randomness of the episode
     track: np.ndarray  # (B, periods + 1, 4): the target's true states, drawn at the start
+    packets: (
+        np.ndarray
+    )  # (B, periods + 1, S, 2) float32: mean level and number of a beacon's packets in reach, drawn or
+    # recorded before the start; else (B, periods + 1, 0, 2)
     sensed: np.ndarray  # (B, S) int8: what each binary sensor sensed last, known to itself alone; else (B, 0)
     row: np.ndarray  # (B,) STATE: what the network knows beside the following
     network: Network
@@ -147,12 +176,16 @@ class State(NamedTuple):
         return len(self.key)
 
     @classmethod
-    def zeros(cls, rows: int, nodes: int, periods: int, particles: int, binary: bool = False) -> State:
+    def zeros(
+        cls, rows: int, nodes: int, periods: int, particles: int, binary: bool = False, hears: bool = False
+    ) -> State:
         """Of the right shapes, before an episode begins."""
         states = nodes if binary else 0
+        receivers = nodes if hears else 0
         return cls(
             key=np.zeros(rows, np.uint64),
             track=np.zeros((rows, periods + 1, 4)),
+            packets=np.zeros((rows, periods + 1, receivers, 2), np.float32),
             sensed=np.zeros((rows, states), np.int8),
             row=np.zeros(rows, STATE),
             network=Network(
@@ -173,6 +206,8 @@ class State(NamedTuple):
                 row=np.zeros(rows, BELIEF),
                 particles=np.zeros((rows, 4, particles), np.float32),
                 log_weights=np.zeros((rows, particles), np.float32),
+                receivers=np.zeros((rows, receivers), RECEIVER),
+                biases=np.zeros((rows, receivers, particles), np.float32),
             ),
         )
 
@@ -185,6 +220,7 @@ class State(NamedTuple):
         return (
             self.key,
             self.track,
+            self.packets,
             self.sensed,
             self.row,
             *self.network.arrays(),
@@ -197,12 +233,13 @@ class State(NamedTuple):
 @spliced
 def state_of(arrays):
     """The state whose `arrays()` they are."""
-    network, ledger, reports, belief = arrays[4:11], arrays[11:14], arrays[14:18], arrays[18:21]
+    network, ledger, reports, belief = arrays[5:12], arrays[12:15], arrays[15:19], arrays[19:24]
     return State(
         arrays[0],
         arrays[1],
         arrays[2],
         arrays[3],
+        arrays[4],
         network_of(network),
         Ledger(*ledger),
         Reports(*reports),
@@ -214,13 +251,16 @@ def _copied(value):
     return type(value)(*map(_copied, value)) if isinstance(value, tuple) else value.copy()
 
 
-KEEP_HEAD, KEEP_CLUSTER = -1, -2
+KEEP_HEAD, KEEP_CLUSTER, NOBODY = -1, -2, -3
 
 
 class Cluster(NamedTuple):
     """A choice: a head and its members."""
 
-    head: np.ndarray  # (B,) node; KEEP_HEAD; or KEEP_CLUSTER: head and members stay as they are
+    head: (
+        np.ndarray
+    )  # (B,) node; KEEP_HEAD; KEEP_CLUSTER: head and members stay as they are; or NOBODY: all sleep, which
+    # only a sink or the target can afford: a head would have to keep the belief
     members: np.ndarray  # (B, M) nodes, -1: no entry; the head may be among them, it always senses
 
     @classmethod

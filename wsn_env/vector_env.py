@@ -136,7 +136,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         cluster = self.interface.action.cluster(_stacked(actions), self._view)
         self._state, outcome = self.world.step(self._state, cluster, donate=True)
         reward, info = self.interface.judge(outcome.row, self._state.lam)
-        self._squares += outcome.error_m * outcome.error_m
+        self._squares += np.where(self._state.period > self.scenario.unscored, outcome.error_m * outcome.error_m, 0.0)
         self._detections += outcome.detections
         if self._bound is not None:
             info["bound_m"] = self._bound.advance(self._state, outcome)
@@ -157,7 +157,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
     def _episode_info(self, rows: np.ndarray) -> dict[str, np.ndarray]:
         """What sums up an episode, of the rows that end."""
         periods = self.scenario.periods
-        info = {"episode_rms_m": np.sqrt(self._squares / periods), "antnp": self._detections / periods}
+        info = {"episode_rms_m": np.sqrt(self._squares / self.scenario.scored), "antnp": self._detections / periods}
         if self._bound is not None:
             info["episode_bound_m"] = self._bound.episode_m()
             if self._bound.kind == "bound":

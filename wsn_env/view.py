@@ -12,7 +12,9 @@ from functools import cached_property
 import numpy as np
 
 from wsn_env.physics import field as geometry
-from wsn_env.types import BELIEF, NETWORK, STATE, Cluster, Grid, Network, Reports, State
+from wsn_env.types import BELIEF, NETWORK, RECEIVER, STATE, Cluster, Grid, Network, Reports, State
+
+HEARING = ("latest_db", "gradient", "variance")  # of a beacon's receivers, what policies ask for
 
 
 def _field(array: str, name: str, meaning: str):
@@ -27,6 +29,7 @@ class View:
     belief: np.ndarray  # (B,) BELIEF
     network: Network
     reports: Reports
+    receivers: np.ndarray  # (B, S) RECEIVER of a beacon; else (B, 0)
     _nearest: dict = field(default_factory=dict, repr=False)
 
     period = _field("row", "period", "(B,) periods done.")
@@ -41,7 +44,7 @@ class View:
     @classmethod
     def of(cls, state: State) -> View:
         """The view of a state."""
-        return cls(state.row, state.belief.row, state.network, state.reports)
+        return cls(state.row, state.belief.row, state.network, state.reports, state.belief.receivers)
 
     @property
     def positions(self) -> np.ndarray:
@@ -145,6 +148,8 @@ class View:
             "detected": self.detected.astype(np.int8),
             "measured": self.measured.copy(),
         }
+        if self.receivers.shape[1]:
+            arrays |= {name: self.receivers[name].copy() for name in HEARING}
         return arrays | ({"bitmap": self.reports.bitmap.copy()} if self.reports.bitmap.shape[1] else {})
 
     @classmethod
@@ -172,7 +177,10 @@ class View:
         geometry.index(positions, grid)
         network = Network(network_row, positions, a["battery"], members, grid)
         bitmap = a.get("bitmap", np.zeros((rows, 0), np.int8))
-        return cls(row, belief, network, Reports(count, node, value, bitmap))
+        receivers = np.zeros((rows, nodes if HEARING[0] in a else 0), RECEIVER)
+        for name in HEARING if receivers.size else ():
+            receivers[name] = a[name]
+        return cls(row, belief, network, Reports(count, node, value, bitmap), receivers)
 
 
 def _mask(nodes: np.ndarray, count: np.ndarray) -> np.ndarray:

@@ -34,7 +34,12 @@ class World:
         self.tracker = make_tracker(scenario, self.threads, fast)
         self._run = compiling.fast(period.run) if fast else period.run
         self._constants = constants(scenario)
-        self._beginning = (*motion_parameters(scenario), episode.start_record(scenario), episode.placed_nodes(scenario))
+        self._beginning = (
+            *motion_parameters(scenario),
+            episode.start_record(scenario),
+            episode.placed_nodes(scenario),
+            *episode.beacon_of(scenario),
+        )
 
     def reset(self, keys) -> State:
         """New episodes.
@@ -48,7 +53,7 @@ class World:
     def allocate(self, rows: int) -> State:
         """Arrays for `restart` to begin episodes in."""
         s = self.scenario
-        return State.zeros(rows, s.field.nodes, s.periods, self.tracker.particles, s.binary)
+        return State.zeros(rows, s.field.nodes, s.periods, self.tracker.particles, s.binary, s.hears)
 
     def restart(self, state: State, rows, keys, donate: bool = False) -> tuple[State, Outcome]:
         """New episodes in some rows of a batch; the others stay, but for the ledger of their last period.
@@ -71,6 +76,8 @@ class World:
         if self.scenario.tracking.start == "search":
             self._search(rows, state, outcome)
         self._in_rows(rows, period.settle, state, outcome)
+        if self.scenario.hears:
+            self._in_rows(rows, period.foretell_rows, self.tracker.maps, state.belief, state.network.positions)
         return state, outcome
 
     def step(self, state: State, cluster: Cluster, donate: bool = False) -> tuple[State, Outcome]:
@@ -91,7 +98,9 @@ class World:
         # Handover and invitations; the target moves; members sense and report; the head predicts and corrects;
         # broadcast, costs, and the prediction for the next period, unless a row must search first.
         if isinstance(self.tracker, ParticleTracker):  # all in one compiled call
-            n_lost = self._over_rows(self._run, heads, members, lost, outcome.row, *state.arrays())
+            known = self._constants, self.tracker.maps
+            arrays = heads, members, lost, outcome.row, *state.arrays()
+            n_lost = over_rows(self._run, state.rows, self.threads, *known, *arrays)
         else:
             self._over_rows(period.sense_and_report, heads, members, state, outcome)
             resampled = np.zeros(state.rows, bool)

@@ -11,7 +11,7 @@ from wsn_env.interface.merit import KEEP, NEAREST, ORDERS, fill_chances, rank_ro
 from wsn_env.physics.constants import constants
 from wsn_env.quantity import suggest
 from wsn_env.scenario import Scenario
-from wsn_env.types import KEEP_CLUSTER, Cluster
+from wsn_env.types import KEEP_CLUSTER, Cluster, Sensors
 from wsn_env.view import View
 
 MENU_MEMBERS = 8  # the menu's largest number of further members
@@ -38,7 +38,7 @@ class MenuAction:
         nodes = view.nearest(self._candidates, self._ring_m)[0]
         heads, members = np.empty(rows, np.int64), np.empty((rows, GROUP), np.int32)
         room = np.empty((3, *nodes.shape)), np.empty(nodes.shape, np.int64)
-        seen = view.network.row, view.positions, view.row, view.belief
+        seen = view.network.row, view.positions, view.receivers, view.row, view.belief
         if _read_menu(0, rows, self._constants, self._by, actions, nodes, *seen, *room, heads, members):
             raise _refusal(action, self.space)
         return Cluster(heads, members)
@@ -55,7 +55,7 @@ class MenuAction:
 
 
 @lean_kernel
-def _read_menu(start, stop, cs, by, actions, nodes, standing, positions, rows, beliefs, *room_and_choice):
+def _read_menu(start, stop, cs, by, actions, nodes, standing, positions, receivers, rows, beliefs, *room_and_choice):
     """Fill heads (B,) and members (B, M) from the menu's entries and the candidates (B, K).
 
     Returns: how many actions are not in the menu.
@@ -74,10 +74,11 @@ def _read_menu(start, stop, cs, by, actions, nodes, standing, positions, rows, b
         if action <= 0:
             rule, further = KEEP, 0
         mean, cov, lam = beliefs[b].predicted_mean, beliefs[b].predicted_cov, rows[b].lam
+        sensors = Sensors(positions[b], receivers[b])
         if by != NEAREST:
-            fill_chances(positions[b], nodes[b], mean, cov, cs[0], chances[b])
+            fill_chances(sensors, nodes[b], mean, cov, cs[0], chances[b])
         given = head, mean, cov, lam, nodes[b], chances[b], cs[0]
-        heads[b] = rank_row(by, rule, positions[b], *given, left[b], ordered[b], drops[b])
+        heads[b] = rank_row(by, rule, sensors, *given, left[b], ordered[b], drops[b])
         slot = 0
         for node in ordered[b]:
             if further > 0 and node >= 0 and node != heads[b]:

@@ -6,6 +6,7 @@ from wsn_env.compiling import lean_piece
 from wsn_env.interface.merit import chance, gain
 from wsn_env.numerics import log
 from wsn_env.physics.field import squared_distance
+from wsn_env.types import Sensors
 
 BELIEF_FEATURES = (
     "lam",  # log, halved
@@ -46,7 +47,7 @@ NINTH = 9
 
 
 @lean_piece
-def describe_belief(b, rows, beliefs, reported, network, nodes, distances, c, f):
+def describe_belief(b, rows, beliefs, reported, receivers, network, nodes, distances, c, f):
     """Fill f with BELIEF_FEATURES of row b. Returns the direction of the predicted velocity.
 
     Args:
@@ -61,7 +62,8 @@ def describe_belief(b, rows, beliefs, reported, network, nodes, distances, c, f)
     f[10] = 0.25 * reported[b]
     if standing.head >= 0:
         is_nearest, n = standing.head == nodes[0], standing.n_members
-        _describe_head(standing.head, is_nearest, network.members[b], n, network.positions[b], m, p, ex, ey, c, f)
+        sensors = Sensors(network.positions[b], receivers[b])
+        _describe_head(standing.head, is_nearest, network.members[b], n, sensors, m, p, ex, ey, c, f)
     f[18] = distances[min(NINTH, len(distances)) - 1] / c.radius_m
     return ex, ey
 
@@ -88,37 +90,38 @@ def _describe_ellipse(m, p, c, f):
 
 
 @lean_piece
-def _describe_head(head, is_nearest, members, n, positions, m, p, ex, ey, c, f):
+def _describe_head(head, is_nearest, members, n, sensors, m, p, ex, ey, c, f):
     """f[11:18]: the head, and what the standing cluster would detect at the prediction."""
-    dx, dy = (positions[head, 0] - m[0]) / c.radius_m, (positions[head, 1] - m[2]) / c.radius_m
+    dx, dy = (sensors.positions[head, 0] - m[0]) / c.radius_m, (sensors.positions[head, 1] - m[2]) / c.radius_m
     f[11] = dx * ex + dy * ey
     f[12] = dy * ex - dx * ey
     f[13] = np.sqrt(dx * dx + dy * dy)
-    f[14] = chance(positions, head, m, p, c)
+    f[14] = chance(sensors, head, m, p, c)
     f[15] = 1.0 if is_nearest else 0.0
     f[16] = 0.25 * n
     missed = 1.0 - f[14]
     for k in range(n):
-        missed *= 1.0 - chance(positions, members[k], m, p, c)
+        missed *= 1.0 - chance(sensors, members[k], m, p, c)
     f[17] = 1.0 - missed
 
 
 @lean_piece
-def describe_candidate(node, detection, head, members, n, positions, m, p, ex, ey, c, g):
+def describe_candidate(node, detection, head, members, n, sensors, m, p, ex, ey, c, g):
     """g[0:2], g[3:7], g[8]: a candidate's place, its chance `detection`, role and gain."""
-    dx, dy = (positions[node, 0] - m[0]) / c.radius_m, (positions[node, 1] - m[2]) / c.radius_m
+    dx, dy = (sensors.positions[node, 0] - m[0]) / c.radius_m, (sensors.positions[node, 1] - m[2]) / c.radius_m
     g[0] = dx * ex + dy * ey
     g[1] = dy * ex - dx * ey
     g[3] = detection
     if head >= 0:
-        g[4] = np.sqrt(squared_distance(positions, node, positions[head, 0], positions[head, 1])) / c.radius_m
+        x, y = sensors.positions[head, 0], sensors.positions[head, 1]
+        g[4] = np.sqrt(squared_distance(sensors.positions, node, x, y)) / c.radius_m
     for k in range(n):
         if members[k] == node:
             g[5] = 1.0
     if node == head:
         g[5] = 1.0
         g[6] = 1.0
-    drop = gain(detection, positions, node, m, p, p[0, 0], p[0, 2], p[2, 2], c)[0]
+    drop = gain(detection, sensors, node, m, p, p[0, 0], p[0, 2], p[2, 2], c)[0]
     g[8] = 0.25 * log(max(drop / (p[0, 0] + p[2, 2] + 1e-12), 1e-6))
 
 

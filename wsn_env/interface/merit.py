@@ -6,7 +6,8 @@ from wsn_env.compiling import kernel, lean_piece
 from wsn_env.numerics import exp, normal_cdf
 from wsn_env.physics.field import squared_distance
 from wsn_env.physics.radio import TO_HEAD, outside, transmission
-from wsn_env.physics.sensing import BINARY, POSITION, mean_detection, strength_slope
+from wsn_env.physics.sensing import BEACON, BINARY, POSITION, mean_detection, strength_slope
+from wsn_env.types import Sensors
 
 TWO_PI = 6.283185307179586
 ORDERS = ("nearest", "information", "value")
@@ -16,20 +17,23 @@ LEAD = 0.3  # sensing radii
 
 
 @lean_piece
-def chance(positions, node, mean, cov, c):
-    """Probability that the node detects the target, under the belief."""
-    dx, dy = mean[0] - positions[node, 0], mean[2] - positions[node, 1]
+def chance(sensors, node, mean, cov, c):
+    """Probability that the node detects the target, under the belief; of a receiver, that it hears its beacon."""
+    if c.model == BEACON:
+        return c.heard
+    dx, dy = mean[0] - sensors.positions[node, 0], mean[2] - sensors.positions[node, 1]
     return mean_detection(dx, dy, cov[0, 0], cov[0, 2], cov[2, 2], c)
 
 
 @lean_piece
-def gain(detection, positions, node, mean, cov, p00, p01, p11, c):
+def gain(detection, sensors, node, mean, cov, p00, p01, p11, c):
     """Expected drop of the position covariance's trace by one report of `node` [m^2], and the covariance after it.
 
     Linearised at the prediction. The report comes with probability p, and with it what a report takes from the
     covariance: the mean over both cases (Sinopoli et al., 2004, for Kalman filters with lost measurements).
 
     Args:
+        sensors: the row's Sensors.
         detection: its `chance` p; of no account for a binary sensor, whose silence tells as much as its report.
         p00, p01, p11: position covariance so far, after the nodes already chosen [m^2].
 
@@ -43,11 +47,14 @@ def gain(detection, positions, node, mean, cov, p00, p01, p11, c):
         c11 = share * (p01 * p01 * s11 - 2.0 * p01 * p01 * p11 + p11 * p11 * s00)
         c01 = share * (p00 * s11 * p01 - p00 * p01 * p11 - p01 * p01 * p01 + p01 * s00 * p11)
         return c00 + c11, p00 - c00, p01 - c01, p11 - c11
-    dx = mean[0] - positions[node, 0]
-    dy = mean[2] - positions[node, 1]
+    dx = mean[0] - sensors.positions[node, 0]
+    dy = mean[2] - sensors.positions[node, 1]
     if c.model == BINARY:
         detection = 1.0
         h0, h1, r = _edge(dx, dy, cov, c)
+    elif c.model == BEACON:  # the tracker has said what to expect
+        receiver = sensors.receivers[node]
+        h0, h1, r = receiver.gradient[0], receiver.gradient[1], max(receiver.variance, 1e-12)
     else:
         # The slope of the strength, smoothed over the belief's own width.
         squared = max(dx * dx + dy * dy + 0.5 * (cov[0, 0] + cov[2, 2]), c.floor_m * c.floor_m)
@@ -79,7 +86,7 @@ def _edge(dx, dy, cov, c):
 
 
 @lean_piece
-def price_mj(detection, positions, node, head, mean, c):
+def price_mj(detection, sensors, node, head, mean, c):
     """Expected energy of a node's being awake for the period instead of asleep, and of its report [mJ].
 
     The report goes to the head, or as far as the prediction where the head is still open; to the sink; to the target.
@@ -88,19 +95,19 @@ def price_mj(detection, positions, node, head, mean, c):
     if c.receiver != TO_HEAD:
         x, y = outside(mean, c)
     elif head >= 0:
-        x, y = positions[head, 0], positions[head, 1]
-    squared = squared_distance(positions, node, x, y)
-    report = transmission(c.report_bits, squared, c)
+        x, y = sensors.positions[head, 0], sensors.positions[head, 1]
+    squared = squared_distance(sensors.positions, node, x, y)
+    report = c.report_packets * transmission(c.report_bits, squared, c)
     if c.receiver == TO_HEAD:
-        report += c.report_bits * c.rx_j_per_bit
+        report += c.report_packets * c.report_bits * c.rx_j_per_bit
     return 1e3 * (detection * report + c.awake_j - c.asleep_j)
 
 
 @lean_piece
-def fill_chances(positions, nodes, mean, cov, c, chances):
+def fill_chances(sensors, nodes, mean, cov, c, chances):
     """chances (K,): of the candidates `nodes`; -1: none."""
     for k in range(len(nodes)):
-        chances[k] = chance(positions, nodes[k], mean, cov, c) if nodes[k] >= 0 else -1.0
+        chances[k] = chance(sensors, nodes[k], mean, cov, c) if nodes[k] >= 0 else -1.0
 
 
 @lean_piece
@@ -113,14 +120,14 @@ def place_of(node, nodes):
 
 
 @lean_piece
-def known_chance(positions, node, nodes, chances, mean, cov, c):
+def known_chance(sensors, node, nodes, chances, mean, cov, c):
     """`chance` of any node; those of the candidates have been filled in."""
     k = place_of(node, nodes)
-    return chances[k] if k >= 0 else chance(positions, node, mean, cov, c)
+    return chances[k] if k >= 0 else chance(sensors, node, mean, cov, c)
 
 
 @lean_piece
-def order_row(positions, head, mean, cov, lam, nodes, chances, c, left, ordered, drops):
+def order_row(sensors, head, mean, cov, lam, nodes, chances, c, left, ordered, drops):
     """Greedy order of one row's candidates: each next one is the best after those before it, by the drop of the root of
     the position covariance's trace that it brings [m], less lam times its price.
 
@@ -135,8 +142,8 @@ def order_row(positions, head, mean, cov, lam, nodes, chances, c, left, ordered,
     """
     p00, p01, p11 = cov[0, 0], cov[0, 2], cov[2, 2]
     if head >= 0:
-        detection = known_chance(positions, head, nodes, chances, mean, cov, c)
-        _, p00, p01, p11 = gain(detection, positions, head, mean, cov, p00, p01, p11, c)
+        detection = known_chance(sensors, head, nodes, chances, mean, cov, c)
+        _, p00, p01, p11 = gain(detection, sensors, head, mean, cov, p00, p01, p11, c)
     ordered[:] = -1
     drops[:] = 0.0
     for k in range(len(nodes)):
@@ -151,17 +158,17 @@ def order_row(positions, head, mean, cov, lam, nodes, chances, c, left, ordered,
             if by_chance:
                 best, most = k, left[k]
                 continue
-            g, q00, q01, q11 = gain(left[k], positions, nodes[k], mean, cov, p00, p01, p11, c)
+            g, q00, q01, q11 = gain(left[k], sensors, nodes[k], mean, cov, p00, p01, p11, c)
             drop = np.sqrt(p00 + p11) - np.sqrt(max(p00 + p11 - g, 0.0))
             value = drop
             if lam > 0.0:
-                value -= lam * price_mj(left[k], positions, nodes[k], head, mean, c)
+                value -= lam * price_mj(left[k], sensors, nodes[k], head, mean, c)
             if value > most:
                 best, most, most_drop, after = k, value, drop, (q00, q01, q11)
         if best < 0:
             break
         if by_chance:
-            g, q00, q01, q11 = gain(most, positions, nodes[best], mean, cov, p00, p01, p11, c)
+            g, q00, q01, q11 = gain(most, sensors, nodes[best], mean, cov, p00, p01, p11, c)
             most_drop, after = np.sqrt(p00 + p11) - np.sqrt(max(p00 + p11 - g, 0.0)), (q00, q01, q11)
         left[best] = -1.0
         ordered[slot] = nodes[best]
@@ -170,7 +177,7 @@ def order_row(positions, head, mean, cov, lam, nodes, chances, c, left, ordered,
 
 
 @lean_piece
-def rank_row(by, rule, positions, head, mean, cov, lam, nodes, chances, c, left, ordered, drops):
+def rank_row(by, rule, sensors, head, mean, cov, lam, nodes, chances, c, left, ordered, drops):
     """Who would lead under a rule, and the candidates in the order that they would join.
 
     Args:
@@ -186,32 +193,32 @@ def rank_row(by, rule, positions, head, mean, cov, lam, nodes, chances, c, left,
     if rule == KEEP:
         leader = head
     elif rule == AHEAD:
-        leader = _nearest_ahead(positions, mean, nodes, c)
+        leader = _nearest_ahead(sensors, mean, nodes, c)
     if by == NEAREST:
         for k in range(len(nodes)):
             ordered[k] = nodes[k]
     else:
         price = lam if by == VALUE else 0.0
-        order_row(positions, leader, mean, cov, price, nodes, chances, c, left, ordered, drops)
+        order_row(sensors, leader, mean, cov, price, nodes, chances, c, left, ordered, drops)
     return leader if leader >= 0 else ordered[0]
 
 
 @lean_piece
-def _nearest_ahead(positions, mean, nodes, c):
+def _nearest_ahead(sensors, mean, nodes, c):
     speed = np.sqrt(mean[1] * mean[1] + mean[3] * mean[3])
     way = LEAD * c.radius_m / max(speed, 1e-9)
     x, y = mean[0] + way * mean[1], mean[2] + way * mean[3]
     best, shortest = -1, np.inf
     for node in nodes:
         if node >= 0:
-            squared = squared_distance(positions, node, x, y)
+            squared = squared_distance(sensors.positions, node, x, y)
             if squared < shortest:
                 best, shortest = node, squared
     return best
 
 
 @kernel
-def order_by_merit(start, stop, cs, positions, heads, beliefs, lams, nodes, ordered):
+def order_by_merit(start, stop, cs, positions, receivers, heads, beliefs, lams, nodes, ordered):
     """`order_row` for every row.
 
     Args:
@@ -222,5 +229,6 @@ def order_by_merit(start, stop, cs, positions, heads, beliefs, lams, nodes, orde
     chances, left, drops = np.empty(nodes.shape[1]), np.empty(nodes.shape[1]), np.empty(nodes.shape[1])
     for b in range(start, stop):
         mean, cov = beliefs[b].predicted_mean, beliefs[b].predicted_cov
-        fill_chances(positions[b], nodes[b], mean, cov, cs[0], chances)
-        order_row(positions[b], heads[b], mean, cov, lams[b], nodes[b], chances, cs[0], left, ordered[b], drops)
+        sensors = Sensors(positions[b], receivers[b])
+        fill_chances(sensors, nodes[b], mean, cov, cs[0], chances)
+        order_row(sensors, heads[b], mean, cov, lams[b], nodes[b], chances, cs[0], left, ordered[b], drops)

@@ -22,7 +22,7 @@ from wsn_env.physics.constants import constants
 from wsn_env.physics.field import find_candidates
 from wsn_env.quantity import suggest
 from wsn_env.scenario import Scenario
-from wsn_env.types import network_of
+from wsn_env.types import Sensors, network_of
 from wsn_env.view import View
 
 G = len(BELIEF_FEATURES)
@@ -43,6 +43,7 @@ def _encode_candidates(
     rows,
     beliefs,
     reported,
+    receivers,
     *network,
 ):
     """Fill out (B, n): BELIEF_FEATURES, then CANDIDATE_FEATURES of each candidate; and the candidates (B, K). Only in
@@ -55,10 +56,10 @@ def _encode_candidates(
         m, p, standing = beliefs[b].predicted_mean, beliefs[b].predicted_cov, network.row[b]
         find_candidates(network, b, m[0], m[2], c.ring_m, nodes[b], distances[b])
         f = out[b]
-        ex, ey = describe_belief(b, rows, beliefs, reported, network, nodes[b], distances[b], c, f[:G])
+        ex, ey = describe_belief(b, rows, beliefs, reported, receivers, network, nodes[b], distances[b], c, f[:G])
         f[G:] = 0.0
-        positions, members = network.positions[b], network.members[b]
-        fill_chances(positions, nodes[b], m, p, c, chances[b])
+        sensors, members = Sensors(network.positions[b], receivers[b]), network.members[b]
+        fill_chances(sensors, nodes[b], m, p, c, chances[b])
         for k in range(nodes.shape[1]):
             node, g = nodes[b, k], f[G + k * width : G + (k + 1) * width]
             if node < 0:
@@ -67,9 +68,9 @@ def _encode_candidates(
             g[2] = distances[b, k] / c.radius_m
             g[7] = network.battery[b, node] / battery_j
             describe_candidate(
-                node, chances[b, k], standing.head, members, standing.n_members, positions, m, p, ex, ey, c, g
+                node, chances[b, k], standing.head, members, standing.n_members, sensors, m, p, ex, ey, c, g
             )
-        order_row(positions, standing.head, m, p, 0.0, nodes[b], chances[b], c, left[b], ordered[b], drops[b])
+        order_row(sensors, standing.head, m, p, 0.0, nodes[b], chances[b], c, left[b], ordered[b], drops[b])
         describe_merit(nodes[b], ordered[b], drops[b], np.sqrt(p[0, 0] + p[2, 2] + 1e-12), width, f[G:])
         clip(f)
 
@@ -91,6 +92,7 @@ def _encode_menu(
     rows,
     beliefs,
     reported,
+    receivers,
     *network,
 ):
     """Fill out (B, n): BELIEF_FEATURES, then ENTRY_FEATURES of each of the menu's entries; the candidates (B, K).
@@ -101,19 +103,20 @@ def _encode_menu(
         if not which[b]:
             continue
         m, p, standing = beliefs[b].predicted_mean, beliefs[b].predicted_cov, network.row[b]
-        positions, members, lam = network.positions[b], network.members[b], rows[b].lam
+        sensors = Sensors(network.positions[b], receivers[b])
+        members, lam = network.members[b], rows[b].lam
         find_candidates(network, b, m[0], m[2], c.ring_m, nodes[b], distances[b])
         f = out[b]
-        way = describe_belief(b, rows, beliefs, reported, network, nodes[b], distances[b], c, f[:G])
+        way = describe_belief(b, rows, beliefs, reported, receivers, network, nodes[b], distances[b], c, f[:G])
         known, numbers = (nodes[b], chances[b], later[b]), (lam, units[b], typical_mj)
-        foresee(positions, known, m, p, c)
-        describe_standing(positions, standing, members, known, m, p, way, numbers, c, f[G : G + width])
+        foresee(sensors, known, m, p, c)
+        describe_standing(sensors, standing, members, known, m, p, way, numbers, c, f[G : G + width])
         for rule in range(3):
             given = standing.head, m, p, lam, nodes[b], chances[b], c
-            leader = rank_row(by, rule, positions, *given, left[b], ordered[b], drops[b])
+            leader = rank_row(by, rule, sensors, *given, left[b], ordered[b], drops[b])
             first = G + width + rule * GROUP * width
             given = known, ordered[b], leader, m, p, way, numbers, c
-            describe_entries(positions, standing, members, *given, width, f[first : first + GROUP * width])
+            describe_entries(sensors, standing, members, *given, width, f[first : first + GROUP * width])
         clip(f)
 
 
@@ -149,7 +152,7 @@ class CandidatesObservation:
     def _run(self, kernel, numbers, out, view: View, rows):
         nodes, distances = view.nearest(self._candidates, self._ring_m)
         room = rows, nodes, distances, np.empty((4, *nodes.shape)), np.empty(nodes.shape, np.int64), out
-        seen = view.row, view.belief, view.reports.count, *view.network.arrays()
+        seen = view.row, view.belief, view.reports.count, view.receivers, *view.network.arrays()
         over_rows(kernel, len(rows), threads_for(rows, self._threads), self._constants, *numbers, *room, *seen)
         return out
 
@@ -224,8 +227,14 @@ class ViewObservation:
                 "detected": spaces.Box(0, 1, (nodes,), np.int8),
                 "measured": box(-far, far, nodes, 2),
             }
+            | (self._of_receivers(box, nodes, far) if scenario.hears else {})
             | ({"bitmap": spaces.Box(0, 1, (nodes,), np.int8)} if scenario.binary else {})
         )
+
+    @staticmethod
+    def _of_receivers(box, nodes: int, far: float) -> dict:
+        shapes = {"latest_db": (nodes,), "gradient": (nodes, 2), "variance": (nodes,)}
+        return {name: box(-far, far, *shape) for name, shape in shapes.items()}
 
     def encode(self, view: View) -> dict[str, np.ndarray]:
         """A dict of (B, ...) arrays, fresh."""

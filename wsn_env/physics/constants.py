@@ -6,7 +6,7 @@ from statistics import NormalDist
 import numpy as np
 
 from wsn_env.scenario import Scenario
-from wsn_env.sections import RECEIVERS, Binary, Detection, Level, Measurement, Position, Threshold
+from wsn_env.sections import RECEIVERS, Beacon, Binary, Detection, Level, Measurement, Position, Threshold
 
 SHARPEST = 1e-6  # m^(2/3): an edge without width would divide by it
 
@@ -14,6 +14,7 @@ CONSTANTS = np.dtype(
     [
         ("period_s", "f8"),
         ("side_m", "f8"),
+        ("depth_m", "f8"),
         # detection: 0 eqs. 2-3, 1 a threshold on the measured level
         ("detection", "i8"),
         ("radius_m", "f8"),
@@ -26,7 +27,7 @@ CONSTANTS = np.dtype(
         ("edge_root", "f8"),  # eqs. 2-3 as a normal distribution in the cube root of the squared distance
         ("edge_width", "f8"),
         ("threshold_db", "f8"),
-        # measurement: 0 position, 1 strength in dB, 2 power, 3 the same as 1 with absorption, 4 one bit
+        # measurement: 0 position, 1 strength in dB, 2 power, 3 the same as 1 with absorption, 4 one bit, 5 beacon
         ("model", "i8"),
         ("level", "f8"),
         ("slope", "f8"),
@@ -39,6 +40,13 @@ CONSTANTS = np.dtype(
         ("every_presence", "i8"),
         ("refresh", "i8"),
         ("ring_m", "f8"),
+        # a beacon: what the tracker takes its levels for
+        ("bias_variance", "f8"),
+        ("bias_kept", "f8"),  # of a bias from period to period
+        ("white_variance", "f8"),  # of one packet
+        ("temper", "f8"),
+        ("heard", "f8"),  # probability that a listening receiver hears any packet in a period
+        ("report_packets", "f8"),  # how many they are then, on average; 1 of all other sensors
         # radio, eq. 5, or modem
         ("tx_j_per_bit", "f8"),
         ("amplifier_j_per_bit_m2", "f8"),
@@ -58,6 +66,9 @@ CONSTANTS = np.dtype(
         ("hop_m", "f8"),
         # tracking
         ("q", "f8"),
+        ("walks", "i8"),
+        ("velocity_kept", "f8"),  # of a walker's, from period to period
+        ("velocity_sd", "f8"),
         ("gate_m", "f8"),  # inf: none
         ("pooled", "i8"),
         ("silent_information", "i8"),
@@ -75,9 +86,11 @@ def constants(scenario: Scenario) -> np.ndarray:
     """The record of a scenario, an array of one."""
     r, t = scenario.radio, scenario.tracking
     record = sensing_constants(scenario.detection, scenario.measurement)
+    walks = t.velocity_s is not None
     values = dict(
         period_s=scenario.period_s,
-        side_m=scenario.field.side_m,
+        side_m=scenario.field.room_m[0],
+        depth_m=scenario.field.room_m[1],
         ring_m=scenario.ring_m,
         tx_j_per_bit=r.tx_j_per_bit,
         amplifier_j_per_bit_m2=r.amplifier_j_per_bit_m2,
@@ -96,6 +109,10 @@ def constants(scenario: Scenario) -> np.ndarray:
         asleep_j=r.asleep_j(scenario.period_s),
         hop_m=r.hop_m,
         q=scenario.filter_q,
+        walks=walks,
+        velocity_kept=math.exp(-scenario.period_s / t.velocity_s) if walks else 1.0,
+        velocity_sd=t.rest_sd_ms,
+        report_packets=1.0,
         gate_m=math.inf if t.gate_m is None else t.gate_m,
         pooled=t.fusion == "pooled",
         silent_information=t.silent_information,
@@ -106,6 +123,12 @@ def constants(scenario: Scenario) -> np.ndarray:
         log_search_miss=math.log(t.search_miss),
         search_gap=t.search_gap,
     )
+    if scenario.hears:
+        m = scenario.measurement
+        values |= dict(bias_variance=m.bias_db**2, bias_kept=math.exp(-scenario.period_s / m.bias_s))
+        values |= dict(white_variance=m.white_db**2, temper=m.temper)
+        heard = m.heard(scenario.period_s)
+        values |= dict(heard=heard, report_packets=m.packets(scenario.period_s) / heard)
     for name, value in values.items():
         record[name] = value
     return record
@@ -135,6 +158,8 @@ def sensing_constants(detection: Detection | Threshold, measurement: Measurement
     elif isinstance(m, Binary):
         values |= dict(flip=m.flip, edge_m=m.edge_m, refresh=m.refresh)
         values |= dict(every_presence=m.reports == "presence")
+    elif isinstance(m, Beacon):
+        values |= dict(floor_m=m.floor_m)
     else:
         values |= dict(level=m.amplitude, slope=m.exponent / 2, noise=m.noise, floor_m=m.floor_m)
     record = np.zeros(1, CONSTANTS)

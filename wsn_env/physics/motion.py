@@ -11,12 +11,13 @@ import numpy as np
 from wsn_env import draws
 from wsn_env.compiling import lean_piece, piece
 from wsn_env.numerics import HALF_PI, sincos
-from wsn_env.physics.recordings import read_track, walk_legs
+from wsn_env.physics.recordings import read_track, replayed_track, walk_legs
 from wsn_env.quantity import ScenarioError
 from wsn_env.scenario import Scenario
-from wsn_env.sections import MOTIONS, Legs, Recorded
+from wsn_env.sections import MOTIONS, Legs, Recorded, Replay, Walk
 
-CROSSING, STRAIGHT, SINE, CIRCLE, TURNS, WAYPOINT, CRUISE, RECORDED, LEGS = range(len(MOTIONS))
+CROSSING, STRAIGHT, SINE, CIRCLE, TURNS, WAYPOINT, CRUISE, RECORDED, LEGS, WALK, REPLAY = range(len(MOTIONS))
+ROUGHENING_M = 0.05  # what a walker's position is uncertain by beside its velocity
 CROSSING_TRIES = 100
 CRUISE_TRIES = 1000
 CODES = dict(zip(MOTIONS.values(), range(len(MOTIONS))))
@@ -31,8 +32,11 @@ def motion_parameters(scenario: Scenario) -> tuple[int, np.ndarray, np.ndarray]:
         recordings = np.stack([read_track(path, scenario) for path in motion.tracks])
     elif isinstance(motion, Legs):
         recordings = walk_legs(scenario)[None]
+    elif isinstance(motion, Replay):
+        recordings = replayed_track(scenario)[None]
     else:
         values = [getattr(motion, item.name) for item in fields(motion)]
+        values += [scenario.field.room_m[1]] if isinstance(motion, Walk) else []
         numbers[: len(values)] = values
     _check_room(scenario)
     return CODES[type(motion)], numbers, recordings
@@ -62,6 +66,14 @@ def _check_room(scenario: Scenario) -> None:
             raise ScenarioError(
                 f"Cruise.speed_ms = {motion.speed_ms}: must be at most {fastest:.4g} m/s, from the inner field to the"
                 f" margin in {scenario.periods} periods"
+            )
+    if name == "Walk":
+        room = min(scenario.field.room_m)
+        if motion.margin_m >= room / 2:
+            raise ScenarioError(f"Walk.margin_m = {motion.margin_m}: must be below half the room, {room / 2} m")
+        if motion.fastest_ms * scenario.period_s > room:
+            raise ScenarioError(
+                f"Walk.fastest_ms = {motion.fastest_ms}: must be at most {room / scenario.period_s} m/s"
             )
     if name in ("Turns", "Waypoint") and motion.speed_ms * scenario.period_s > side:
         raise ScenarioError(
@@ -93,6 +105,8 @@ def draw_track(code, numbers, recordings, stream, period_s, side_m, track):
         _visit(stream, numbers[0], period_s, side_m, track)
     elif code == CRUISE:
         _cruise(stream, numbers[0], numbers[1], numbers[2], numbers[3], period_s, side_m, track)
+    elif code == WALK:
+        _walk(stream, numbers[0], numbers[1], numbers[2], period_s, side_m, numbers[3], track)
     else:  # recorded, or of straight legs
         track[:] = recordings[int(draws.uniform(stream, 0) * len(recordings))]
     for state in track:
@@ -149,6 +163,28 @@ def predict_covariance(cov, t, q, predicted_cov):
         for i in range(2):
             for j in range(2):
                 predicted_cov[axis + i, axis + j] += q * q * gain[i] * gain[j]
+
+
+@lean_piece
+def predict_walk(mean, cov, c, predicted_mean, predicted_cov):
+    """F x and F P F' + Q of a walker: v' = a v + sd sqrt(1 - a^2) e, x' = x + T (v + v') / 2; without walls."""
+    a, half = c.velocity_kept, 0.5 * c.period_s
+    way = half * (1.0 + a)
+    variance = (1.0 - a * a) * c.velocity_sd * c.velocity_sd
+    noise = (half * half * variance + ROUGHENING_M * ROUGHENING_M, half * variance, variance)
+    for axis in (0, 2):
+        predicted_mean[axis] = mean[axis] + way * mean[axis + 1]
+        predicted_mean[axis + 1] = a * mean[axis + 1]
+        for other in (0, 2):
+            pp, pv, vp, vv = cov[axis, other], cov[axis, other + 1], cov[axis + 1, other], cov[axis + 1, other + 1]
+            predicted_cov[axis, other] = pp + way * (pv + vp) + way * way * vv
+            predicted_cov[axis, other + 1] = a * (pv + way * vv)
+            predicted_cov[axis + 1, other] = a * (vp + way * vv)
+            predicted_cov[axis + 1, other + 1] = a * a * vv
+        predicted_cov[axis, axis] += noise[0]
+        predicted_cov[axis, axis + 1] += noise[1]
+        predicted_cov[axis + 1, axis] += noise[1]
+        predicted_cov[axis + 1, axis + 1] += noise[2]
 
 
 @piece
@@ -260,6 +296,31 @@ def _visit(stream, speed_ms, period_s, side_m, track):
                 draw += 2
         distance = np.sqrt((goal_x - x) ** 2 + (goal_y - y) ** 2)
         scale = speed_ms / distance if distance > 0.0 else 0.0
+        track[k] = np.array((x, scale * (goal_x - x), y, scale * (goal_y - y)))
+
+
+@piece
+def _walk(stream, slowest_ms, fastest_ms, margin_m, period_s, side_m, depth_m, track):
+    width, depth = side_m - 2.0 * margin_m, depth_m - 2.0 * margin_m
+    x = margin_m + width * draws.uniform(stream, 0)
+    y = margin_m + depth * draws.uniform(stream, 1)
+    goal_x, goal_y, speed, draw = x, y, 1.0, 2
+    for k in range(len(track)):
+        left = period_s if k > 0 else 0.0  # s
+        while True:
+            distance = np.sqrt((goal_x - x) ** 2 + (goal_y - y) ** 2)
+            if distance > left * speed:
+                x += (goal_x - x) * left * speed / distance
+                y += (goal_y - y) * left * speed / distance
+                break
+            left -= distance / speed
+            x, y = goal_x, goal_y
+            goal_x = margin_m + width * draws.uniform(stream, draw)
+            goal_y = margin_m + depth * draws.uniform(stream, draw + 1)
+            speed = slowest_ms + (fastest_ms - slowest_ms) * draws.uniform(stream, draw + 2)
+            draw += 3
+        distance = np.sqrt((goal_x - x) ** 2 + (goal_y - y) ** 2)
+        scale = speed / distance if distance > 0.0 else 0.0
         track[k] = np.array((x, scale * (goal_x - x), y, scale * (goal_y - y)))
 
 

@@ -84,12 +84,15 @@ def send_out(sender, x, y, bits, purpose, state, outcome, b, c):
 def outside(mean, c):
     """Where a receiver outside the network stands, as far as the network knows: the sink in the middle of the field,
     the target where it is predicted. (A price of the true way would tell the target's distance through batteries.)"""
-    return (mean[0], mean[2]) if c.receiver == TO_TARGET else (0.5 * c.side_m, 0.5 * c.side_m)
+    return (mean[0], mean[2]) if c.receiver == TO_TARGET else (0.5 * c.side_m, 0.5 * c.depth_m)
 
 
 @lean_piece
-def report(node, head, purpose, state, outcome, b, c):
+def report(node, head, packets, purpose, state, outcome, b, c):
     """A node's report with its retries. Returns whether it was received; to the head its own is free.
+
+    Args:
+        packets: how many it is long.
 
     Beyond one hop nothing is sent: after a search the new head may lie so far, for a modem.
     """
@@ -106,9 +109,9 @@ def report(node, head, purpose, state, outcome, b, c):
     stream = draws.stream(state.key[b], state.row[b].period, packet)
     for attempt in range(c.tries):
         if c.receiver == TO_HEAD:
-            sent = send(node, head, c.report_bits, purpose, state, outcome, b, c)
+            sent = send(node, head, packets * c.report_bits, purpose, state, outcome, b, c)
         else:
-            sent = send_out(node, x, y, c.report_bits, purpose, state, outcome, b, c)
+            sent = send_out(node, x, y, packets * c.report_bits, purpose, state, outcome, b, c)
         if not sent:
             return False
         if draws.uniform(stream, 16 * node + attempt) < c.packet_success:

@@ -1,11 +1,14 @@
-"""Tracks that are the same in every episode: straight legs, and recorded ones."""
+"""What is the same in every episode: straight legs, recorded tracks, recorded packets."""
 
 import csv
 
 import numpy as np
 
+from wsn_env.bluetooth.replay import receivers_of, recorded
 from wsn_env.quantity import ScenarioError
 from wsn_env.scenario import Scenario
+
+SAME_PLACE_M = 0.05
 
 
 def walk_legs(scenario: Scenario) -> np.ndarray:
@@ -92,3 +95,37 @@ def _resampled(path, times, points, scenario: Scenario) -> np.ndarray:
         track[:, 2 * axis] = np.interp(at, times, points[:, axis])
         track[:, 2 * axis + 1] = np.gradient(track[:, 2 * axis], scenario.period_s)
     return track
+
+
+def replayed_track(scenario: Scenario) -> np.ndarray:
+    """The track (periods + 1, 4) of a recording; it begins where the first period's packets were sent.
+
+    Raises:
+        ScenarioError: the recording is shorter than the horizon, leaves the room, or has other receivers.
+    """
+    path, room = scenario.motion.recording, np.array(scenario.field.room_m)
+    _, _, positions = recorded(path, scenario.period_s)
+    if len(positions) < scenario.periods:
+        raise ScenarioError(f"Scenario.periods = {scenario.periods}: must be at most {len(positions)}, those of {path}")
+    theirs, ours = receivers_of(path)[:, :2], np.array(scenario.field.positions or ()).reshape(-1, 2)
+    if theirs.shape != ours.shape or np.abs(theirs - ours).max() > SAME_PLACE_M:
+        raise ScenarioError(
+            f"Field.positions: must be those of the {len(theirs)} receivers of {path}, in the same order (calibrate on"
+            " its folder)"
+        )
+    if (positions < -SAME_PLACE_M).any() or (positions > room + SAME_PLACE_M).any():
+        raise ScenarioError(f"{path}: leaves the room of {room[0]:g} x {room[1]:g} m (side_m, depth_m)")
+    track = np.empty((scenario.periods + 1, 4))
+    track[1:, ::2] = np.clip(positions[: scenario.periods], 0.0, room)
+    track[0] = track[1]
+    for axis in (0, 2):
+        track[:, axis + 1] = np.gradient(track[:, axis], scenario.period_s) if scenario.periods > 0 else 0.0
+    return track
+
+
+def replayed_packets(scenario: Scenario) -> np.ndarray:
+    """Mean level [dBm] and number of the packets that each receiver recorded: (periods + 1, S, 2), none in period 0."""
+    levels, counts, _ = recorded(scenario.motion.recording, scenario.period_s)
+    packets = np.zeros((scenario.periods + 1, levels.shape[1], 2), np.float32)
+    packets[1:, :, 0], packets[1:, :, 1] = levels[: scenario.periods], counts[: scenario.periods]
+    return packets

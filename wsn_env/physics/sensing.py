@@ -12,9 +12,10 @@ from wsn_env.compiling import lean_kernel, lean_piece
 from wsn_env.numerics import exp, log, normal_cdf
 from wsn_env.physics.constants import sensing_constants
 from wsn_env.physics.field import squared_distance
-from wsn_env.sections import Binary, Detection, Measurement, Position, Rssi, RssiPower, Sonar, Threshold
+from wsn_env.sections import Beacon, Binary, Detection, Measurement, Position, Rssi, RssiPower, Sonar, Threshold
 
-POSITION, STRENGTH, POWER, SONAR, BINARY = (kind.code for kind in (Position, Rssi, RssiPower, Sonar, Binary))
+KINDS = (Position, Rssi, RssiPower, Sonar, Binary, Beacon)
+POSITION, STRENGTH, POWER, SONAR, BINARY, BEACON = (kind.code for kind in KINDS)
 THRESHOLD = Threshold.code
 
 

@@ -4,6 +4,7 @@ Every default is system A's (Xiang & Guo, 2013, Table 1) unless its meaning says
 follow from others are properties, never fields.
 """
 
+from wsn_env.sections.beacon import Beacon
 from wsn_env.sections.field import Field
 from wsn_env.sections.motion import (
     MOTIONS,
@@ -13,15 +14,16 @@ from wsn_env.sections.motion import (
     Legs,
     Motion,
     Recorded,
+    Replay,
     Sine,
     Straight,
     Turns,
+    Walk,
     Waypoint,
 )
-from wsn_env.sections.radio import RADIOS, RECEIVERS, Link, Modem, Radio
+from wsn_env.sections.radio import RADIOS, RECEIVERS, Bluetooth, Link, Modem, Radio
 from wsn_env.sections.sensing import (
     DETECTIONS,
-    MEASUREMENTS,
     Binary,
     Detection,
     Level,
@@ -32,7 +34,7 @@ from wsn_env.sections.sensing import (
     Sonar,
     Threshold,
 )
-from wsn_env.sections.tracking import BOUNDARY_TRACKERS, READS, TRACKERS, Tracking
+from wsn_env.sections.tracking import BOUNDARY_TRACKERS, MEASUREMENTS, READS, TRACKERS, Tracking
 
 __all__ = [
     "BOUNDARY_TRACKERS",
@@ -43,7 +45,9 @@ __all__ = [
     "READS",
     "RECEIVERS",
     "TRACKERS",
+    "Beacon",
     "Binary",
+    "Bluetooth",
     "Circle",
     "Crossing",
     "Cruise",
@@ -58,6 +62,7 @@ __all__ = [
     "Position",
     "Radio",
     "Recorded",
+    "Replay",
     "Rssi",
     "RssiPower",
     "Sine",
@@ -66,5 +71,6 @@ __all__ = [
     "Threshold",
     "Tracking",
     "Turns",
+    "Walk",
     "Waypoint",
 ]

@@ -16,6 +16,9 @@ class Field(Section):
 
     nodes: int = quantity(225, "number of sensor nodes S", at_least=1, whole=True)
     side_m: float = quantity(100.0, "side of the square field", above=0, at_most=100_000)
+    depth_m: float | None = quantity(
+        None, "depth of the room along y where that is less than the side; None: a square", above=0, optional=True
+    )
     layout: str = quantity(
         "uniform",
         "uniform: anywhere; grid: each within a square cell of its own (a square number of nodes)",
@@ -35,6 +38,10 @@ class Field(Section):
 
     def __post_init__(self):
         super().__post_init__()
+        if self.depth_m is not None and (self.positions is None or self.depth_m > self.side_m):
+            raise ScenarioError(
+                f"Field.depth_m = {self.depth_m}: must be at most side_m = {self.side_m}, and needs given positions"
+            )
         if self.positions is not None:
             if self.field_seed is not None:
                 raise ScenarioError(f"Field.field_seed = {self.field_seed}: must be None where positions are given")
@@ -48,9 +55,16 @@ class Field(Section):
                 raise ScenarioError(
                     f"Field.positions spans {array.min()}..{array.max()}: must lie in 0..{self.side_m} m"
                 )
+            if array[:, 1].max() > self.room_m[1]:
+                raise ScenarioError(f"Field.positions has y = {array[:, 1].max()}: must be at most {self.room_m[1]} m")
             if self.nodes not in (type(self).nodes, len(array)):
                 raise ScenarioError(f"Field.nodes = {self.nodes}: must be {len(array)}, as many as there are positions")
             object.__setattr__(self, "positions", tuple(map(tuple, array.tolist())))
             object.__setattr__(self, "nodes", len(array))
         elif self.layout == "grid" and isqrt(self.nodes) ** 2 != self.nodes:
             raise ScenarioError(f"Field.nodes = {self.nodes}: must be a square number (1, 4, 9, ...) on a grid")
+
+    @property
+    def room_m(self) -> tuple[float, float]:
+        """Extent along x and y."""
+        return self.side_m, self.side_m if self.depth_m is None else self.depth_m

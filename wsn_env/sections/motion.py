@@ -78,6 +78,21 @@ class Waypoint(Motion):
 
 
 @dataclass(frozen=True)
+class Walk(Motion):
+    """A walk in a room: straight to a uniform point of it, then to the next, each leg at a speed of its own."""
+
+    fitting_q: ClassVar[float] = 0.2
+    slowest_ms: float = quantity(0.14, "least speed of a leg", above=0)
+    fastest_ms: float = quantity(0.73, "greatest speed of a leg", above=0)
+    margin_m: float = quantity(1.0, "goals keep this distance from the walls", at_least=0)
+
+    def __post_init__(self):
+        super().__post_init__()
+        if self.slowest_ms > self.fastest_ms:
+            raise ScenarioError(f"Walk.slowest_ms = {self.slowest_ms}: must be at most fastest_ms = {self.fastest_ms}")
+
+
+@dataclass(frozen=True)
 class Cruise(Motion):
     """From a uniform point of the inner field at a given speed in any direction, with white acceleration.
 
@@ -110,6 +125,24 @@ class Recorded(Motion):
         object.__setattr__(self, "tracks", tuple(str(name) for name in names))
         if not self.tracks:
             raise ScenarioError("Recorded.tracks = (): must name at least one CSV file with columns t, x, y")
+        super().__post_init__()
+
+
+@dataclass(frozen=True)
+class Replay(Motion):
+    """A recorded walk with a beacon, and the packets that were recorded with it; nothing else reaches the tracker.
+
+    A file of the published format, see `wsn_env.bluetooth`. The target's position in a period is the mean of its
+    packets'. Where the horizon is not given it is the recording's.
+    """
+
+    fitting_q: ClassVar[float] = 0.2
+    recording: str = ""
+
+    def __post_init__(self):
+        object.__setattr__(self, "recording", str(self.recording))
+        if not self.recording:
+            raise ScenarioError("Replay.recording = '': must name a file such as straight_01_all_sensors.mbd")
         super().__post_init__()
 
 
@@ -157,4 +190,6 @@ MOTIONS = {
     "cruise": Cruise,
     "recorded": Recorded,
     "legs": Legs,
+    "walk": Walk,
+    "replay": Replay,
 }

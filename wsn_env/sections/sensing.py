@@ -212,6 +212,3 @@ class Binary(Measurement):
     )
     flip: float = quantity(0.0, "probability that a node misreads its state in a period", at_least=0, below=0.5)
     edge_m: float = quantity(1.0, "width of the edge of detection that the particle filter believes in", above=0)
-
-
-MEASUREMENTS = {"position": Position, "rssi": Rssi, "rssi_power": RssiPower, "sonar": Sonar, "binary": Binary}

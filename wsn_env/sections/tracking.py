@@ -5,7 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from wsn_env.quantity import Section, quantity
-from wsn_env.sections.sensing import MEASUREMENTS, Binary, Position, Rssi, RssiPower, Sonar
+from wsn_env.sections.beacon import Beacon
+from wsn_env.sections.sensing import Binary, Position, Rssi, RssiPower, Sonar
+
+MEASUREMENTS = {
+    "position": Position,
+    "rssi": Rssi,
+    "rssi_power": RssiPower,
+    "sonar": Sonar,
+    "binary": Binary,
+    "beacon": Beacon,
+}
 
 BOUNDARY_TRACKERS = ("boundary_raw", "boundary", "boundary_mid", "boundary_ekf", "centroid", "centroid_rls")
 TRACKERS = {  # name: where the class stands
@@ -68,6 +78,13 @@ class Tracking(Section):
         "sd of the filter's acceleration noise [m/s^2]; None: what suits the motion",
         at_least=0,
         at_most=1000,
+        optional=True,
+    )
+    velocity_s: float | None = quantity(
+        None,
+        "the filter's target walks in the room: its velocity is an Ornstein-Uhlenbeck process of sd rest_sd_ms and this"
+        " time constant, reflected at the walls; None: white acceleration of filter_q anywhere (particle only)",
+        above=0,
         optional=True,
     )
     gate_m: float | None = quantity(

@@ -11,7 +11,8 @@ from wsn_env import draws
 from wsn_env.compiling import kernel, lean_kernel, lean_piece, piece
 from wsn_env.draws import normal_pair32
 from wsn_env.numerics import F, exp32, f32_bits, f32_from_bits
-from wsn_env.physics.sensing import BINARY
+from wsn_env.physics.sensing import BEACON, BINARY
+from wsn_env.trackers.levels import draw_biases, scatter_walkers, walk, weigh_levels
 from wsn_env.trackers.likelihood import weigh, weigh_awake, weigh_states
 from wsn_env.trackers.resampling import REACH, correlated, lower_root, resample, spread_copies
 from wsn_env.types import Belief, Reports, network_of
@@ -148,6 +149,16 @@ def spread_rows(start, stop, keys, periods, rows, belief):
 
 
 @lean_kernel
+def scatter_rows(start, stop, cs, keys, periods, rows, belief):
+    """Scatter walkers all over the room in the rows marked."""
+    c = cs[0]
+    for b in range(start, stop):
+        if rows[b]:
+            stream = draws.stream(keys[b], periods[b], draws.CLOUD)
+            scatter_walkers(stream, belief.particles[b], belief.log_weights[b], c.velocity_sd, c.side_m, c.depth_m)
+
+
+@lean_kernel
 def relocate_rows(start, stop, keys, periods, rows, belief):
     """Move the clouds of the rows marked in `rows` to their beliefs' position mean and covariance."""
     for b in range(start, stop):
@@ -157,10 +168,11 @@ def relocate_rows(start, stop, keys, periods, rows, belief):
 
 
 @piece
-def filter_row(key, period, belief, network, reports, b, c, room):
+def filter_row(key, period, belief, network, reports, b, c, maps, room):
     """One period of row b: `period` counts from 1; the belief is that after the period before.
 
     Args:
+        maps: of `levels.weigh_levels`.
         room: what `scratch` gives.
 
     Returns: whether the particles were resampled.
@@ -168,9 +180,15 @@ def filter_row(key, period, belief, network, reports, b, c, room):
     x, log_weights, row = belief.particles[b], belief.log_weights[b], belief.row[b]
     weights, slots, states = room
     n, count = x.shape[1], reports.count[b]
-    predict(draws.stream(key, period, draws.PROCESS), x, c.period_s, c.q)
+    if c.walks:
+        walk(draws.stream(key, period, draws.PROCESS), x, c)
+    else:
+        predict(draws.stream(key, period, draws.PROCESS), x, c.period_s, c.q)
     if c.model == BINARY:
         weigh_states(x, log_weights, network, reports.bitmap[b], reports.node[b, :count], b, c)
+        count = 0
+    elif c.model == BEACON:
+        weigh_levels(x, log_weights, belief, network, reports, b, c, maps, weights)
         count = 0
     for j in range(count):
         position, value = network.positions[b, reports.node[b, j]], reports.value[b, j]
@@ -186,6 +204,8 @@ def filter_row(key, period, belief, network, reports, b, c, room):
     if resampled:
         u = draws.uniform(draws.stream(key, period, draws.RESAMPLING), 0)
         resample(u, x, log_weights, weights, total, slots, states)
+        if c.model == BEACON:
+            draw_biases(belief.biases[b], slots[2, REACH:], weights)
         if c.spread_scale > 0.0:
             spread_copies(draws.stream(key, period, draws.SPREAD), slots[2, REACH:], c.spread_scale, row.cov, x)
     return resampled
@@ -212,9 +232,9 @@ def scratch(particles):
 
 
 @kernel
-def filter_rows(start, stop, constants, keys, periods, resampled, *arrays):
+def filter_rows(start, stop, constants, maps, keys, periods, resampled, *arrays):
     """One period of the filter alone; `arrays` are the belief's, the reports' and the network's."""
-    belief, reports, network = Belief(*arrays[:3]), Reports(*arrays[3:7]), network_of(arrays[7:])
+    belief, reports, network = Belief(*arrays[:5]), Reports(*arrays[5:9]), network_of(arrays[9:])
     room = scratch(belief.particles.shape[2])
     for b in range(start, stop):
-        resampled[b] = filter_row(keys[b], periods[b], belief, network, reports, b, constants[0], room)
+        resampled[b] = filter_row(keys[b], periods[b], belief, network, reports, b, constants[0], maps, room)

@@ -2,6 +2,7 @@
 
 from wsn_env import compiling
 from wsn_env.compiling import over_rows, threads_for
+from wsn_env.physics.beacon import maps_of
 from wsn_env.physics.constants import constants
 from wsn_env.scenario import Scenario
 from wsn_env.trackers import kernels
@@ -21,10 +22,16 @@ class ParticleTracker:
         self.threads = threads
         self._filter_rows = compiling.fast(kernels.filter_rows) if fast else kernels.filter_rows
         self._constants = constants(scenario)
+        self.maps = maps_of(scenario)
+        self._anywhere = scenario.tracking.velocity_s is not None and scenario.tracking.start != "known"
 
     def start(self, keys, periods, rows, belief: Belief) -> None:
-        """Draw the clouds of the marked rows from N(mean, cov), in place."""
+        """Draw the clouds of the marked rows from N(mean, cov), in place; of walkers whose start is not known, from all
+        over the room."""
         threads = threads_for(rows, self.threads)
+        if self._anywhere:
+            over_rows(kernels.scatter_rows, len(keys), threads, self._constants, keys, periods, rows, belief)
+            return
         over_rows(kernels.spread_rows, len(keys), threads, keys, periods, rows, belief)
 
     def relocate(self, keys, periods, rows, belief: Belief) -> None:
@@ -35,4 +42,5 @@ class ParticleTracker:
     def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
         """Predict, weigh, read mean and covariance, resample, in place."""
         arrays = *belief, *reports, *network.arrays()
-        over_rows(self._filter_rows, len(keys), self.threads, self._constants, keys, periods, resampled, *arrays)
+        known = self._constants, self.maps
+        over_rows(self._filter_rows, len(keys), self.threads, *known, keys, periods, resampled, *arrays)

@@ -1,0 +1,30 @@
+"""All together, now and then."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from agents.base import ViewPolicy
+from wsn_env.quantity import check_quantity
+from wsn_env.types import NOBODY, Cluster
+from wsn_env.view import View
+
+
+@dataclass(frozen=True)
+class Every(ViewPolicy):
+    """All living nodes in every n-th period, nobody in between; where a head must keep the belief it stays awake."""
+
+    n: int = 4
+    sees_lam = False
+
+    def __post_init__(self):
+        check_quantity("Every", "n", self.n, at_least=1, whole=True)
+
+    def act(self, view: View) -> Cluster:
+        """Wake everybody or nobody, for every row."""
+        now = view.period % self.n == 0
+        between = np.where(view.head >= 0, view.head, view.nearest_living())
+        between = between if self.scenario.radio.receiver == "head" else NOBODY
+        return Cluster.of(np.where(now, view.nearest_living(), between), view.alive & now[:, None])
