@@ -124,6 +124,13 @@ def test_expm1_32_loses_nothing_near_zero():
     assert numerics.expm1_32(np.float32(-1e30)) == -1
 
 
+def test_cos_turns32_is_within_2e6_of_the_cosine(uniform):
+    cos = over(numerics.cos_turns32)
+    for width in (0.5, 3.0, 1e4):
+        t = uniform(-width, width).astype(np.float32)
+        assert np.abs(cos(t) - np.cos(2 * np.pi * t.astype(float))).max() < 2e-6
+
+
 def test_tanh32_holds_for_every_mantissa():
     tanh32 = over(numerics.tanh32)
     for exponent in (-126, -12, -2, -1, 0, 3):

@@ -11,7 +11,7 @@ import numpy as np
 from wsn_env import draws
 from wsn_env.bluetooth.replay import load_map
 from wsn_env.compiling import piece
-from wsn_env.numerics import HALF_PI, exp, log, sincos
+from wsn_env.numerics import HALF_PI, F, cos_turns32, exp, log
 from wsn_env.physics.recordings import replayed_packets
 from wsn_env.quantity import ScenarioError
 from wsn_env.scenario import Scenario
@@ -86,7 +86,7 @@ def draw_packets(key, track, positions, receivers, period_s, c, packets):
     periods = len(track) - 1
     sent = int((periods + 0.5) * period_s / c.interval_s) + 1
     phase = draws.uniform(draws.stream(key, 0, draws.BEACON_NOISE), 0)
-    x, y, when = np.empty(sent), np.empty(sent), np.empty(sent, np.int64)
+    x, y, when = np.empty(sent, np.float32), np.empty(sent, np.float32), np.empty(sent, np.int64)
     for e in range(sent):
         place = (e + phase) * c.interval_s / period_s
         k = min(int(place), periods - 1)
@@ -95,11 +95,11 @@ def draw_packets(key, track, positions, receivers, period_s, c, packets):
         y[e] = track[k, 2] + share * (track[k + 1, 2] - track[k, 2])
         when[e] = int(place + 0.5)
     packets[:] = 0.0
-    wave, level = np.empty((WAVES, 3)), np.empty(sent)
+    field = np.empty(sent, np.float32)
     kept = exp(-c.interval_s / c.drift_s)
     fresh = c.drift_db * np.sqrt(1.0 - kept * kept)
     for j in range(len(receivers)):
-        _draw_field(draws.stream(key, j, draws.BEACON_FIELD), x, y, wave, c, level)
+        _draw_field(draws.stream(key, j, draws.BEACON_FIELD), x, y, c, field)
         drifts = draws.stream(key, j, draws.BEACON_DRIFT)
         noises, losses = draws.stream(key, j + 1, draws.BEACON_NOISE), draws.stream(key, j, draws.BEACON_LOSS)
         drift = c.drift_db * draws.normal_pair(drifts, 0)[0]
@@ -118,7 +118,7 @@ def draw_packets(key, track, positions, receivers, period_s, c, packets):
                 white = c.fade_db + c.fade_sd_db * normal
             else:
                 white = c.main_db + c.main_sd_db * normal
-            heard = np.floor(receivers[j, 0] - receivers[j, 1] * log(squared) + level[e] + drift + white + 0.5)
+            heard = np.floor(receivers[j, 0] - receivers[j, 1] * log(squared) + field[e] + drift + white + 0.5)
             packets[when[e], j, 0] += np.float32(heard)
             packets[when[e], j, 1] += np.float32(1.0)
         for k in range(periods + 1):
@@ -126,21 +126,15 @@ def draw_packets(key, track, positions, receivers, period_s, c, packets):
 
 
 @piece
-def _draw_field(stream, x, y, wave, c, level):
+def _draw_field(stream, x, y, c, field):
     """A Gaussian field of covariance sd^2 exp(-d / l) at the points: WAVES cosines, whose wave vectors follow the
     covariance's spectrum, a Cauchy distribution in the plane."""
-    level[:] = 0.0
-    if c.field_db == 0.0:
-        return
-    for f in range(WAVES):
+    field[:] = F(0)
+    amplitude = F(c.field_db * np.sqrt(2.0 / WAVES))
+    for f in range(WAVES if c.field_db > 0.0 else 0):
         u, v = draws.normal_pair(stream, 2 * f)
         scale, _ = draws.normal_pair(stream, 2 * f + 1)
-        stretch = 1.0 / (c.field_m * max(abs(scale), SHORTEST))
-        wave[f, 0], wave[f, 1] = u * stretch, v * stretch
-        wave[f, 2] = 4.0 * HALF_PI * draws.uniform(stream, 4 * WAVES + f)
-    amplitude = c.field_db * np.sqrt(2.0 / WAVES)
-    for e in range(len(x)):
-        total = 0.0
-        for f in range(WAVES):
-            total += sincos(wave[f, 0] * x[e] + wave[f, 1] * y[e] + wave[f, 2])[1]
-        level[e] = amplitude * total
+        turns = 1.0 / (4.0 * HALF_PI * c.field_m * max(abs(scale), SHORTEST))
+        a, b, phase = F(u * turns), F(v * turns), F(draws.uniform(stream, 4 * WAVES + f))
+        for e in range(len(x)):
+            field[e] += amplitude * cos_turns32(a * x[e] + b * y[e] + phase)

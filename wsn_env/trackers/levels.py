@@ -185,34 +185,49 @@ def foretell(belief, positions, b, c, maps, room):
 
 @lean_piece
 def _sum_places(points, lanes, s):
-    """s: sums of w, w x, w y, w xx, w xy, w yy over points (3, P) = w, x, y, in fixed lanes."""
+    """s: sums of w, w x, w y, w xx, w xy, w yy over points (3 or more, P) = w, x, y, ..., in fixed lanes."""
     lanes[:] = F(0)
-    n = points.shape[1]
-    for o in range(0, n, LANES):
-        for k in range(min(LANES, n - o)):
-            w, x, y = points[0, o + k], points[1, o + k], points[2, o + k]
-            lanes[0, k] += w
-            lanes[1, k] += w * x
-            lanes[2, k] += w * y
-            lanes[3, k] += w * x * x
-            lanes[4, k] += w * x * y
-            lanes[5, k] += w * y * y
+    w, x, y, n = points[0], points[1], points[2], points.shape[1]
+    whole = n // LANES * LANES
+    for o in range(0, whole, LANES):
+        for k in range(LANES):
+            _gather_place(w[o + k], x[o + k], y[o + k], lanes, k)
+    for i in range(whole, n):
+        _gather_place(w[i], x[i], y[i], lanes, 0)
     _close(lanes, s, 6)
+
+
+@lean_piece
+def _gather_place(w, x, y, lanes, k):
+    wx, wy = w * x, w * y
+    lanes[0, k] += w
+    lanes[1, k] += wx
+    lanes[2, k] += wy
+    lanes[3, k] += wx * x
+    lanes[4, k] += wx * y
+    lanes[5, k] += wy * y
 
 
 @lean_piece
 def _sum_levels(points, levels, lanes, s):
     """s: sums of w l, w l x, w l y, w l l."""
     lanes[:] = F(0)
-    n = points.shape[1]
-    for o in range(0, n, LANES):
-        for k in range(min(LANES, n - o)):
-            e = points[0, o + k] * levels[o + k]
-            lanes[0, k] += e
-            lanes[1, k] += e * points[1, o + k]
-            lanes[2, k] += e * points[2, o + k]
-            lanes[3, k] += e * levels[o + k]
+    w, x, y, n = points[0], points[1], points[2], points.shape[1]
+    whole = n // LANES * LANES
+    for o in range(0, whole, LANES):
+        for k in range(LANES):
+            _gather_level(w[o + k] * levels[o + k], x[o + k], y[o + k], levels[o + k], lanes, k)
+    for i in range(whole, n):
+        _gather_level(w[i] * levels[i], x[i], y[i], levels[i], lanes, 0)
     _close(lanes, s, 4)
+
+
+@lean_piece
+def _gather_level(e, x, y, level, lanes, k):
+    lanes[0, k] += e
+    lanes[1, k] += e * x
+    lanes[2, k] += e * y
+    lanes[3, k] += e * level
 
 
 @lean_piece
