@@ -10,6 +10,8 @@ import pytest
 
 from examples.ble_tracks import positions
 from wsn_env import Scenario, World, evaluate
+from wsn_env.bluetooth.dataset import read_dataset
+from wsn_env.bluetooth.synthetic import write_dataset
 
 FOLDER = os.environ.get("WSN_BLE_DIR")
 SCRIPT = Path(__file__).parents[1] / "examples" / "ble_tracks.py"
@@ -22,19 +24,22 @@ def convert(data, out):
     )
 
 
-def test_lines_become_a_track_in_order_of_time(tmp_path):
-    packet = "{t},b827eb4521b4,e78f135624ce,-87,{x},{y},1.8,0,0,-1,1,0,0,0,-1,0\n"
-    lines = [packet.format(t=t, x=x, y=y) for t, x, y in ((102.5, 3, 4), (100.0, 1, 2), (102.5, 3, 4), (101.0, 2, 2))]
-    (tmp_path / "walk.mbd").write_text("".join(lines))
-    assert positions(tmp_path / "walk.mbd") == [(0.0, 1.0, 2.0), (1.0, 2.0, 2.0), (2.5, 3.0, 4.0)]
+def test_a_folder_becomes_tracks_in_order_of_time(tmp_path):
+    write_dataset(tmp_path, tracks=2, seconds=20)
+    track = read_dataset(tmp_path)[0]
+    points = positions(track)
+    assert points[0][0] == 0.0 and all(a[0] < b[0] for a, b in zip(points, points[1:]))
+    assert len(points) == len(np.unique(track.time_s))
     assert convert(tmp_path, tmp_path / "out").returncode == 0
-    scenario = Scenario.named("PreDC-v0", motion="recorded", tracks=(str(tmp_path / "out" / "walk.csv"),), periods=5)
-    track = World(scenario).reset([1]).track[0]
-    assert np.allclose(track[[0, 2, 5], ::2], [[10, 10], [50, 10], [90, 90]])  # 2 m become 80, a point every 0.5 s
-    (tmp_path / "walk.mbd").write_text("".join(lines) + "nonsense\n")
-    answer = convert(tmp_path, tmp_path / "out")
-    assert answer.returncode == 2 and "walk.mbd, line 5" in answer.stderr
-    assert "holds no" in convert(tmp_path / "out", tmp_path / "out").stderr
+    file = str(tmp_path / "out" / "walk_0.csv")
+    scenario = Scenario.named("PreDC-v0", motion="recorded", tracks=(file,), periods=40)
+    drawn = World(scenario).reset([1]).track[0]
+    assert np.allclose(np.ptp(drawn[:, ::2], axis=0).max(), 80, atol=1)  # scaled
+    shape = track.position_m[:, :2] - track.position_m[0, :2]
+    scale = 80 / np.ptp(shape, axis=0).max()
+    assert np.allclose(drawn[-1, ::2] - drawn[0, ::2], scale * shape[-1], atol=0.1)
+    answer = convert(tmp_path / "out", tmp_path / "out")
+    assert answer.returncode == 2 and answer.stderr.startswith("ble_tracks.py: ")
 
 
 @needs_tracks
