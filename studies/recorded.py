@@ -120,8 +120,8 @@ def draw_replay(evaluation: RecordedEvaluation, asked: Study, path: Path) -> Non
             listened[state.network.head[0]] += 1
             listened[state.network.members[0, : state.network.n_members[0]]] += 1
     seen, time = np.array(seen), np.arange(1, len(seen) + 1) * scenario.period_s
-    figure = plt.figure(figsize=(11, 5.4), layout="constrained")
-    room, error, load = (figure.add_subplot(place) for place in (121, 222, 224))
+    figure, axes = plt.subplot_mosaic([["room", "error"], ["room", "load"]], figsize=(11, 5.6), layout="constrained")
+    room, error, load = axes["room"], axes["error"], axes["load"]
     width, depth = scenario.field.room_m
     room.add_patch(plt.Rectangle((0, 0), width, depth, fill=False, color="#333333"))
     places = np.array(scenario.field.positions)
@@ -130,15 +130,16 @@ def draw_replay(evaluation: RecordedEvaluation, asked: Study, path: Path) -> Non
     room.plot(*seen[:, :2].T, color="#333333", linewidth=2.5, label="recorded way")
     room.plot(*seen[:, 2:].T, color="#D55E00", linewidth=1.2, marker=".", markersize=4, label="estimate")
     room.set(aspect="equal", xlabel="x [m]", ylabel="y [m]", title=f"{name}, lam = {scenario.lam:g} m/mJ")
-    room.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), frameon=False, ncols=2, fontsize=9)
+    room.set_ylim(-4.5, depth + 1)
+    room.legend(loc="lower center", frameon=False, ncols=2, fontsize=9, markerscale=0.4)
     error.plot(time, errors, color="#D55E00", label="error")
     error.plot(time, sds, color="#0072B2", linewidth=1, linestyle="--", label="what the belief expects")
     error.set(ylabel="m", ylim=(0, None))
     error.legend(frameon=False, fontsize=9)
     load.step(time, awake, where="mid", color="#333333")
     load.set(xlabel="time [s]", ylabel="listening receivers", ylim=(0, len(places)))
-    for axes in (error, load):
-        axes.grid(alpha=0.3)
+    for chart in (error, load):
+        chart.grid(alpha=0.3)
     with replacing(path) as temporary:
         figure.savefig(temporary, dpi=140, format="png")
     plt.close(figure)

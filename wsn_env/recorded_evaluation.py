@@ -247,14 +247,15 @@ def draw_recorded(evaluation: RecordedEvaluation, path: str | Path) -> None:
             color=next(colours, "#333333"),
             label=stem.rstrip(":=n"),
         )
-    for policy in policies:
+    for k, policy in enumerate(policies):
         if stem_of(policy) not in stems:
             points = [[evaluation.mean(policy, each, name) for name in ("energy_mj", "rms_m")] for each in lams]
             points = sorted(dict.fromkeys(map(tuple, points)))  # one, if it does not look at lam
-            star, square = dict(marker="*", markersize=13, color="#D55E00"), dict(marker="s", color="#333333")
-            style = star if len(points) > 1 else square
-            axes.plot(*zip(*points), linewidth=1.2, zorder=3, **style)
-            axes.annotate(policy, points[-1], xytext=(6, 5), textcoords="offset points", fontsize=9)
+            learned = policy.startswith("ppo")
+            style = dict(marker="*", markersize=13, color="#D55E00") if learned else dict(marker="s", color="#333333")
+            axes.plot(*zip(*points), linewidth=1.2, zorder=4 if learned else 3, **style)
+            side = (6, 8) if k % 2 else (6, -13)
+            axes.annotate(policy, points[-1], xytext=side, textcoords="offset points", fontsize=9)
     axes.set_xlabel("energy [mJ per period]")
     axes.set_ylabel("RMS error, mean over the tracks [m]")
     axes.set_title(f"{evaluation.first.scenario.name}: {_what(evaluation)}")
