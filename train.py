@@ -177,6 +177,10 @@ def train(settings: Training) -> None:
 
 def complete(settings: Training) -> Scenario:
     """Fill in what was left out, by scenario, and return that."""
+    if settings.tracks and Scenario.named(settings.scenario).hears:
+        raise ValueError(
+            f"train.py: tracks: {settings.scenario} is trained in its simulated form; wsn evaluate replays"
+        )
     scenario = make_scenario(settings.scenario, settings.set, settings.tracks)
     settings.lam = settings.lam or list(scenario.lam_span)
     if len(settings.lam) > 2:

@@ -8,6 +8,7 @@ import numpy as np
 
 from agents.base import ViewPolicy
 from wsn_env.physics.sensing import joint_detection_probability
+from wsn_env.quantity import check_quantity
 from wsn_env.types import Cluster
 from wsn_env.view import View
 
@@ -27,6 +28,11 @@ class PreDC(ViewPolicy):
     keep_theta: float | None = None  # joint probability that keeps a cluster; None: theta; 0: as printed
     phi0_m: float = 2.0  # Phi0: prediction sd from which the cluster is formed anew [m]
     sees_lam = False
+
+    def __post_init__(self):
+        check_quantity("PreDC", "theta", self.theta, at_least=0, at_most=1)
+        check_quantity("PreDC", "keep_theta", self.keep_theta, at_least=0, at_most=1, optional=True)
+        check_quantity("PreDC", "phi0_m", self.phi0_m, at_least=0)
 
     def act(self, view: View) -> Cluster:
         """Keep or form, for every row."""

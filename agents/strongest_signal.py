@@ -9,6 +9,7 @@ import numpy as np
 
 from agents.base import ViewPolicy
 from wsn_env.physics.field import distances_to
+from wsn_env.quantity import check_quantity
 from wsn_env.sections import Level, Position
 from wsn_env.types import Cluster
 from wsn_env.view import View
@@ -29,6 +30,10 @@ class StrongestSignal(ViewPolicy):
     hysteresis_db: float = 3.0
     hop_m: float | None = None  # None: the modem's; the sensing radius where the radio has no limit
     sees_lam = False
+
+    def __post_init__(self):
+        check_quantity("StrongestSignal", "hysteresis_db", self.hysteresis_db, at_least=0)
+        check_quantity("StrongestSignal", "hop_m", self.hop_m, above=0, optional=True)
 
     def act(self, view: View) -> Cluster:
         """Follow, for every row."""

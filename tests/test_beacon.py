@@ -276,7 +276,7 @@ def test_periods_of_acquisition_do_not_count_in_the_rms():
         (dict(search=True), "Tracking.search = True: allowed is False with Beacon levels"),
         (dict(fusion="pooled"), "allowed are False and 'joint' with Beacon levels"),
         (dict(tracker="ekf", velocity_s=None), "cannot read Beacon reports"),
-        (dict(depth_m=30.0), "Field.depth_m = 30.0: must be at most side_m"),
+        (dict(depth_m=10.0), "Field.positions spans y = 0.27..17.64: must lie in 0..10.0 m"),
         (dict(unscored=100), "Scenario.unscored = 100: must be below periods = 100"),
         (dict(slowest_ms=2.0), "Walk.slowest_ms = 2.0: must be at most fastest_ms"),
         (dict(calibration="nowhere.json"), "calibration = 'nowhere.json': is no file of `wsn calibrate`"),
@@ -292,6 +292,26 @@ def test_bad_quantities_are_refused_by_name(changes, message):
 def test_only_a_beacon_can_be_replayed():
     with pytest.raises(ScenarioError, match="Scenario.measurement = Position: must be Beacon with the motion 'replay'"):
         Scenario.named("PreDC-v0", motion="replay", recording="x.mbd", periods=5)
+
+
+def test_a_room_may_be_deeper_than_wide():
+    turned = tuple((y, x) for x, y in BLE.field.positions)
+    scenario = BLE.override(positions=turned, side_m=17.641, depth_m=20.66, periods=150)
+    state = World(scenario).reset(keys_of(0, 50))
+    assert 17.641 < state.track[..., 2].max() <= 20.66 - 1 + 1e-9 and state.track[..., 0].max() <= 17.641 - 1 + 1e-9
+    for motion in ("waypoint", "turns"):
+        track = World(BLE.override(motion=motion, depth_m=17.641, periods=150)).reset(keys_of(0, 50)).track
+        assert 17.0 < track[..., 2].max() <= 17.641 and track[..., 0].max() > 17.641
+
+
+def test_a_calibration_must_be_whole(tmp_path):
+    from wsn_env.bluetooth.calibration import QUANTITIES
+    from wsn_env.bluetooth.replay import CALIBRATED
+
+    assert set(CALIBRATED) == set(QUANTITIES)
+    (tmp_path / "c.json").write_text('{"quantities": {"positions": [[1, 2]], "loss": 0.1}}')
+    with pytest.raises(ScenarioError, match="c.json.*lack side_m, depth_m, heights_m"):
+        BLE.override(calibration=tmp_path / "c.json")
 
 
 def test_one_number_serves_all_receivers():

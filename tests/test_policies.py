@@ -293,3 +293,15 @@ def test_a_package_of_ones_own_adds_a_policy(tmp_path):
     )
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert answer.stdout.strip() == "20.0"
+
+
+def test_parameters_of_the_published_policies_are_checked():
+    for name, message in (
+        ("pre_dc:theta=", "PreDC.theta = ''"),
+        ("pre_dc:phi0_m=-1", "PreDC.phi0_m = -1"),
+        ("strongest_signal:hop_m=0", "StrongestSignal.hop_m = 0"),
+        ("random:n=-1", "Random.n = -1"),
+        ("every:n=0", "Every.n = 0"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            make_policy(name, SCENARIO)

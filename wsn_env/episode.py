@@ -90,7 +90,7 @@ def begin(
         state.reports.bitmap[b] = 0
         belief.n_eff = state.belief.particles.shape[2]
         track_stream = draws.stream(key, 0, draws.TRACK)
-        draw_track(motion, numbers, recordings, track_stream, c.period_s, c.side_m, state.track[b])
+        draw_track(motion, numbers, recordings, track_stream, c.period_s, c.side_m, c.depth_m, state.track[b])
         if len(receivers) > 0:
             if len(recorded) > 0:
                 state.packets[b] = recorded

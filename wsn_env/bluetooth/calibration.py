@@ -59,7 +59,7 @@ LISTS = {
     "exponents": ("path loss exponents (n)", dict(above=0)),
 }
 NUMBERS = {
-    "side_m": ("larger of the room's width and depth", dict(above=0)),
+    "side_m": ("width of the room, along x", dict(above=0)),
     "depth_m": ("depth of the room, along y", dict(above=0)),
     "beacon_m": ("mean height of the beacon", {}),
     "field_db": ("sd of the field that stands in the room", dict(at_least=0)),
@@ -205,7 +205,7 @@ def calibrate(tracks: Sequence[Track]) -> Calibration:
     mean = np.bincount(packets.receiver, residual, count) / heard
     quantities = {
         "positions": receivers.positions_m[:, :2],
-        "side_m": max(receivers.limits_m),
+        "side_m": receivers.limits_m[0],
         "depth_m": receivers.limits_m[1],
         "heights_m": receivers.positions_m[:, 2],
         "beacon_m": packets.position_m[:, 2].mean(),

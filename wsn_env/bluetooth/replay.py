@@ -16,6 +16,10 @@ from wsn_env.bluetooth.dataset import DEVICES, PARAMETERS, DatasetError, Track, 
 from wsn_env.quantity import ScenarioError
 
 CELL_M = 0.25  # of a residual map
+CALIBRATED = (  # quantities of a calibration, all of them
+    "positions side_m depth_m heights_m beacon_m at_1m_db exponents field_db field_m drift_db drift_s main_db"
+    " main_sd_db fade_share fade_db fade_sd_db loss loss_after_loss interval_s bias_s"
+).split()
 
 
 def recorded(path: str | Path, period_s: float):
@@ -71,6 +75,9 @@ def read_quantities(path: str | Path) -> dict[str, Any]:
         quantities = plain["quantities"]
         if not isinstance(quantities, dict):
             raise TypeError("its 'quantities' must be a table")
+        missing = [name for name in CALIBRATED if name not in quantities]
+        if missing:
+            raise KeyError(f"its 'quantities' lack {', '.join(missing)}")
     except (OSError, ValueError, KeyError, TypeError) as problem:
         raise ScenarioError(f"calibration = {str(path)!r}: is no file of `wsn calibrate`: {problem!r}") from None
     if isinstance(quantities.get("positions"), list):

@@ -35,7 +35,7 @@ def frame(state: State, scenario: Scenario, row: int = 0) -> np.ndarray:
     """
     from PIL import Image, ImageDraw
 
-    scale = (SIZE - 2 * MARGIN) / scenario.field.side_m
+    scale = (SIZE - 2 * MARGIN) / max(scenario.field.room_m)
     network, belief = state.network, state.belief
 
     def pixel(x, y):
@@ -59,7 +59,7 @@ def frame(state: State, scenario: Scenario, row: int = 0) -> np.ndarray:
         draw.line([pixel(x, y) for x, y in past[:, ::2]], fill=TRUTH, width=2)
 
     head, target = network.head[row], state.track[row, min(state.period[row], scenario.periods), ::2]
-    middle = (scenario.field.side_m / 2, scenario.field.side_m / 2)
+    middle = tuple(extent / 2 for extent in scenario.field.room_m)
     receivers = {"head": network.positions[row, head], "sink": middle, "target": target}
     if head >= 0:
         receiver = receivers[scenario.radio.receiver]

@@ -14,7 +14,7 @@ from wsn_env.numerics import HALF_PI, sincos
 from wsn_env.physics.recordings import read_track, replayed_track, walk_legs
 from wsn_env.quantity import ScenarioError
 from wsn_env.scenario import Scenario
-from wsn_env.sections import MOTIONS, Legs, Recorded, Replay, Walk
+from wsn_env.sections import MOTIONS, Legs, Recorded, Replay
 
 CROSSING, STRAIGHT, SINE, CIRCLE, TURNS, WAYPOINT, CRUISE, RECORDED, LEGS, WALK, REPLAY = range(len(MOTIONS))
 ROUGHENING_M = 0.05  # what a walker's position is uncertain by beside its velocity
@@ -36,7 +36,6 @@ def motion_parameters(scenario: Scenario) -> tuple[int, np.ndarray, np.ndarray]:
         recordings = replayed_track(scenario)[None]
     else:
         values = [getattr(motion, item.name) for item in fields(motion)]
-        values += [scenario.field.room_m[1]] if isinstance(motion, Walk) else []
         numbers[: len(values)] = values
     _check_room(scenario)
     return CODES[type(motion)], numbers, recordings
@@ -89,7 +88,7 @@ def _check_room(scenario: Scenario) -> None:
 
 
 @piece
-def draw_track(code, numbers, recordings, stream, period_s, side_m, track):
+def draw_track(code, numbers, recordings, stream, period_s, side_m, depth_m, track):
     """Fill `track` (periods + 1, 4) with the true states."""
     if code == CROSSING:
         _cross(stream, numbers[0], numbers[1], numbers[2], period_s, side_m, track)
@@ -106,12 +105,12 @@ def draw_track(code, numbers, recordings, stream, period_s, side_m, track):
     elif code == CRUISE:
         _cruise(stream, numbers[0], numbers[1], numbers[2], numbers[3], period_s, side_m, track)
     elif code == WALK:
-        _walk(stream, numbers[0], numbers[1], numbers[2], period_s, side_m, numbers[3], track)
+        _walk(stream, numbers[0], numbers[1], numbers[2], period_s, side_m, depth_m, track)
     else:  # recorded, or of straight legs
         track[:] = recordings[int(draws.uniform(stream, 0) * len(recordings))]
     for state in track:
         _reflect(state, 0, side_m)
-        _reflect(state, 2, side_m)
+        _reflect(state, 2, depth_m)
 
 
 @piece

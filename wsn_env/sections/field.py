@@ -17,7 +17,11 @@ class Field(Section):
     nodes: int = quantity(225, "number of sensor nodes S", at_least=1, whole=True)
     side_m: float = quantity(100.0, "side of the square field", above=0, at_most=100_000)
     depth_m: float | None = quantity(
-        None, "depth of the room along y where that is less than the side; None: a square", above=0, optional=True
+        None,
+        "depth of the room along y, whose width is side_m; None: a square",
+        above=0,
+        at_most=100_000,
+        optional=True,
     )
     layout: str = quantity(
         "uniform",
@@ -38,10 +42,8 @@ class Field(Section):
 
     def __post_init__(self):
         super().__post_init__()
-        if self.depth_m is not None and (self.positions is None or self.depth_m > self.side_m):
-            raise ScenarioError(
-                f"Field.depth_m = {self.depth_m}: must be at most side_m = {self.side_m}, and needs given positions"
-            )
+        if self.depth_m is not None and self.positions is None:
+            raise ScenarioError(f"Field.depth_m = {self.depth_m}: must be None where nodes are drawn")
         if self.positions is not None:
             if self.field_seed is not None:
                 raise ScenarioError(f"Field.field_seed = {self.field_seed}: must be None where positions are given")
@@ -51,12 +53,11 @@ class Field(Section):
                 raise ScenarioError(f"Field.positions = {self.positions!r}: must be finite pairs (x, y) in m") from None
             if array.ndim != 2 or array.shape[1] != 2 or not len(array) or not np.isfinite(array).all():
                 raise ScenarioError(f"Field.positions has shape {array.shape}: must be finite pairs (x, y) in m")
-            if array.min() < 0 or array.max() > self.side_m:
-                raise ScenarioError(
-                    f"Field.positions spans {array.min()}..{array.max()}: must lie in 0..{self.side_m} m"
-                )
-            if array[:, 1].max() > self.room_m[1]:
-                raise ScenarioError(f"Field.positions has y = {array[:, 1].max()}: must be at most {self.room_m[1]} m")
+            for axis, (places, extent) in zip("xy", zip(array.T, self.room_m)):
+                if places.min() < 0 or places.max() > extent:
+                    raise ScenarioError(
+                        f"Field.positions spans {axis} = {places.min()}..{places.max()}: must lie in 0..{extent} m"
+                    )
             if self.nodes not in (type(self).nodes, len(array)):
                 raise ScenarioError(f"Field.nodes = {self.nodes}: must be {len(array)}, as many as there are positions")
             object.__setattr__(self, "positions", tuple(map(tuple, array.tolist())))
