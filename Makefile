@@ -10,7 +10,7 @@ VENV := .venv
 RUN := $(VENV)/bin/python
 READY := $(VENV)/.ready
 
-.PHONY: train pretrained test slow examples bench bench-short lint clean
+.PHONY: train pretrained test slow examples bench bench-short docs lint clean
 
 train: $(READY)
 	$(RUN) train.py --resume --scenario $(SCENARIO) $(if $(LAM),--lam $(LAM))
@@ -47,6 +47,14 @@ bench-short: $(READY)
 
 $(VENV)/.bench: $(READY)
 	$(RUN) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[test,bench]"
+	touch $@
+
+# The documentation site, warnings as errors; out/docs/index.html.
+docs: $(VENV)/.docs
+	$(VENV)/bin/sphinx-build -q -W --keep-going -b html docs out/docs
+
+$(VENV)/.docs: $(READY)
+	$(RUN) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[test,docs]"
 	touch $@
 
 lint: $(READY)

@@ -119,7 +119,7 @@ class Scenario(Section):
 
     def _check_tracker(self) -> None:
         name, kind = self.tracking.tracker, type(self.measurement)
-        if kind not in READS[name]:
+        if not issubclass(kind, READS[name]):
             able = [measurement for measurement, its_kind in MEASUREMENTS.items() if its_kind in READS[name]]
             allowed = "allowed are the measurements" if len(able) > 1 else "allowed is the measurement"
             raise ScenarioError(
