@@ -17,7 +17,7 @@ from benchmarks.race import Result
 
 # Files of this folder; each is a claim, with the command line of race.main. In the order of running.
 CLAIMS = (
-    *("environment", "vector", "overhead", "nodes", "memory", "training", "rllib", "recording"),
+    *("environment", "vector", "overhead", "nodes", "memory", "training", "rllib", "recording", "frames"),
     *("filter_step", "filter_scaling"),
 )
 

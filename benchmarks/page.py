@@ -23,7 +23,7 @@ PAGE = ROOT / "docs" / "performance.md"
 RESULTS = ROOT / "benchmarks" / "results"
 ORDER = (
     *("filter_step", "environment", "vector", "overhead", "training", "rllib", "filter_scaling", "nodes", "memory"),
-    "recording",
+    *("recording", "frames"),
 )
 EVERY_CONTESTANT = ("particles", "rows")  # plots that stand together, at the end
 ENVIRONMENTS = "env_rows"  # joins the second of them

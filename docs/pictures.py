@@ -11,8 +11,8 @@ from pathlib import Path
 from PIL import Image
 
 from wsn_env import Scenario, View, World, draws, make_policy
-from wsn_env.interface.render import frame
 from wsn_env.registration import IDS
+from wsn_env.rendering.camera import Camera
 
 SEED, PERIODS = 7, 25
 POLICIES = (  # where a policy is at home
@@ -28,11 +28,13 @@ HOME = {"Binary-v0": "boundary", "Anchors-v0": "nearest2", "Underwater-v0": "str
 def draw(name: str, policy: str, path: Path) -> None:
     """A frame of an episode under a policy, after PERIODS periods."""
     scenario = Scenario.named(name)
-    world, chooser = World(scenario), make_policy(policy, scenario)
-    state = world.reset([draws.key_of_seed(SEED)])
+    world, chooser, camera = World(scenario), make_policy(policy, scenario), Camera(scenario)
+    state, outcome = world.restart(world.allocate(1), [True], [draws.key_of_seed(SEED)])
+    camera.begin(state, outcome, [True])
     for _ in range(PERIODS):
-        state, _ = world.step(state, chooser.act(View.of(state)))
-    Image.fromarray(frame(state, scenario)).save(path)
+        state, outcome = world.step(state, chooser.act(View.of(state)))
+        camera.add(state, outcome)
+    Image.fromarray(camera.frames(state)[0]).save(path)
 
 
 def draw_all(folder: Path) -> None:

@@ -30,7 +30,9 @@ for scenario, trackers in {
         kept = ["silent_information=false", "resampling=systematic"]
         quantities = ["particles=60", "periods=4", f"tracker={tracker}", *kept]
         main(["evaluate", "--scenario", scenario, "--episodes", "2", "--policies", "all", "--set", *quantities])
-gym.make("wsn_env/Binary-v0", order="value", particles=60, start="search").reset(seed=0)
+env = gym.make("wsn_env/Binary-v0", order="value", particles=60, start="search", render_mode="rgb_array")
+env.reset(seed=0)
+env.render()
 """
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from benchmarks import memory, nodes, overhead, recording, training, vector
+from benchmarks import frames, memory, nodes, overhead, recording, training, vector
 from benchmarks.race import Options
 from benchmarks.stopwatch import Stopwatch
 from wsn_env.types import State
@@ -85,6 +85,14 @@ def test_reading_a_recording(monkeypatch):
     monkeypatch.setattr(recording, "by_csv", lambda path: recording.by_numpy(path) + 1.0)
     with pytest.raises(SystemExit, match="csv and float and read_track do not read the same"):
         recording.measure(GLANCE, QUIET)
+
+
+def test_frames(monkeypatch):
+    result = whole(frames.measure(GLANCE, QUIET), 2)
+    assert [row[0] for row in result.tables[0].rows] == ["wsn_env", "Pillow, jagged", "Pillow, smooth"]
+    monkeypatch.setattr(frames, "by_pillow", lambda *_: np.zeros((10, 10, 3), np.uint8))
+    with pytest.raises(SystemExit, match="Pillow, jagged lacks"):
+        frames.measure(GLANCE, QUIET)
 
 
 def test_training():

@@ -29,6 +29,7 @@ FLOORS = {
     "wsn_env.world": 4,
     "wsn_env.policies": 4,
     "wsn_env.interface": 5,
+    "wsn_env.rendering": 5,
     "wsn_env.bounds": 5,
     "agents": 5,
     "wsn_env.env": 6,

@@ -188,9 +188,12 @@ def run_compile(command: Compile) -> None:
     started = time.perf_counter()
     for fast in (False, True):
         for order in ("nearest", "information"):
-            env = ClusterEnv(particles=20, periods=3, start="search", order=order, fast=fast)
+            env = ClusterEnv(
+                particles=20, periods=3, start="search", order=order, fast=fast, render_mode="rgb_array", frame_px=64
+            )
             env.reset(seed=0)
             env.step(10)
+            env.render()
     scenarios = [Scenario.named("PreDC-v0", tracker=tracker) for tracker in ("particle", "snapshot", "ickf")]
     scenarios.append(Scenario.named("Binary-v0", nodes=20, tracker="boundary"))
     for tracker in ("grnn", "nonlinear_ls"):

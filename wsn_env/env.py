@@ -11,7 +11,7 @@ import numpy as np
 from wsn_env import draws
 from wsn_env.bounds import Bound, bound_kind
 from wsn_env.interface import Interface, Settings
-from wsn_env.interface.render import check_render_mode, frame
+from wsn_env.rendering.camera import FPS, RENDER_MODES, Camera
 from wsn_env.scenario import Scenario
 from wsn_env.types import OUTCOME, Outcome, State
 from wsn_env.view import View
@@ -29,14 +29,15 @@ class ClusterEnv(gym.Env):
             MO-Gymnasium has it, with `reward_space` and `reward_dim`).
         order: "nearest" | "information" | "value", the menu's order of merit.
         candidates: K, how many nodes actions and observations consider.
-        render_mode: None | "rgb_array".
+        render_mode: None | "rgb_array" | "human", a window, for which pygame-ce must be installed.
+        frame_px: side of a frame.
         fast: a quicker particle filter, equal to rounding, whose bits differ from processor to processor.
         overrides: any quantity of the scenario: `nodes=400, particles=1000, lam=(0.3, 30), motion="sine"`.
 
     An episode is truncated at the horizon and never terminates: a lost track or a dead network goes on.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
+    metadata = {"render_modes": list(RENDER_MODES), "render_fps": FPS}
 
     def __init__(
         self,
@@ -47,11 +48,12 @@ class ClusterEnv(gym.Env):
         order: str = "nearest",
         candidates: int = Settings.candidates,
         render_mode: str | None = None,
+        frame_px: int = 600,
         fast: bool = False,
         **overrides,
     ):
-        check_render_mode(render_mode, self.metadata)
         self.scenario = Scenario.of(scenario, **overrides)
+        self._camera = None if render_mode is None else Camera(self.scenario, render_mode, frame_px)
         self.interface = Interface(self.scenario, Settings(action, observation, reward, order, candidates))
         self.world = World(self.scenario, threads=1, fast=fast)
         self.render_mode = render_mode
@@ -78,6 +80,9 @@ class ClusterEnv(gym.Env):
         info = self._judge(outcome)[1]
         if self._bound is not None:
             info["bound_m"] = self._bound.begin(self._state).item()
+        if self._camera is not None:
+            self._camera.begin(self._state, outcome, [True])
+            self._camera.show(self._state)
         return self._observe(), info
 
     def step(self, action):
@@ -94,6 +99,9 @@ class ClusterEnv(gym.Env):
         self._detections += info["detections"]
         if self._bound is not None:
             info["bound_m"] = self._bound.advance(self._state, outcome).item()
+        if self._camera is not None:
+            self._camera.add(self._state, outcome)
+            self._camera.show(self._state)
         truncated = self._state.period.item() >= self.scenario.periods
         if truncated:
             info["episode_rms_m"] = math.sqrt(self._squares / self.scenario.scored)
@@ -119,11 +127,16 @@ class ClusterEnv(gym.Env):
         return self.interface.action.masks(self.view)[0]
 
     def render(self):
-        """A frame (H, W, 3) uint8 of the present state."""
-        if self.render_mode is None or self._state is None:
-            gym.logger.warn("render() needs render_mode='rgb_array' and a reset environment")
+        """A frame (frame_px, frame_px, 3) uint8 of the present state; in "human" mode None: reset and step show it."""
+        if self._camera is None or self._state is None:
+            gym.logger.warn("render() needs render_mode='rgb_array' or 'human' and a reset environment")
             return None
-        return frame(self._state, self.scenario)
+        return self._camera.frames(self._state)[0] if self.render_mode == "rgb_array" else None
+
+    def close(self):
+        """Close the window, if there is one."""
+        if self._camera is not None:
+            self._camera.close()
 
     def _observe(self):
         self._view = View.of(self._state)

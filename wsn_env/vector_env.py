@@ -13,7 +13,7 @@ from gymnasium.vector.utils import batch_space
 from wsn_env import draws
 from wsn_env.bounds import Bound, bound_kind
 from wsn_env.interface import Interface, Settings
-from wsn_env.interface.render import check_render_mode, frame
+from wsn_env.rendering.camera import FPS, RENDER_MODES, Camera
 from wsn_env.scenario import Scenario
 from wsn_env.types import State
 from wsn_env.view import View
@@ -31,7 +31,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         The rest: as ClusterEnv. A vector reward has the shape (B, 2); `reward_space` and `reward_dim` are of one row.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 10, "autoreset_mode": AutoresetMode.NEXT_STEP}
+    metadata = {"render_modes": list(RENDER_MODES), "render_fps": FPS, "autoreset_mode": AutoresetMode.NEXT_STEP}
 
     def __init__(
         self,
@@ -43,12 +43,12 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         order: str = "nearest",
         candidates: int = Settings.candidates,
         render_mode: str | None = None,
+        frame_px: int = 600,
         fast: bool = False,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
         **overrides,
     ):
-        check_render_mode(render_mode, self.metadata)
         if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
             raise ValueError(f"num_envs = {num_envs!r}: must be a whole number, at least 1")
         self.num_envs = int(num_envs)
@@ -56,6 +56,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self.metadata = type(self).metadata | {"autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
         self.scenario = Scenario.of(scenario, **overrides)
+        self._camera = None if render_mode is None else Camera(self.scenario, render_mode, frame_px)
         self.world = World(self.scenario, threads, fast)
         settings = Settings(action, observation, reward, order, candidates)
         self.interface = Interface(self.scenario, settings, self.world.threads)
@@ -95,6 +96,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         if self._state is None:
             self._state = self.world.allocate(self.num_envs)
         info = self._restart(rows)
+        self._show()
         return self._observe(rows), _masked(info, rows)
 
     def _rows_to_reset(self, options) -> np.ndarray:
@@ -121,6 +123,8 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         info = self.interface.judge(outcome.row, self._state.lam)[1]
         if self._bound is not None:
             info["bound_m"] = self._bound.begin(self._state, rows)
+        if self._camera is not None:
+            self._camera.begin(self._state, outcome, rows)
         return info
 
     def step(self, actions):
@@ -140,6 +144,8 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self._detections += outcome.detections
         if self._bound is not None:
             info["bound_m"] = self._bound.advance(self._state, outcome)
+        if self._camera is not None:
+            self._camera.add(self._state, outcome)
         if begins:  # next-step mode: these rows only begin
             reward[anew] = 0.0
             _overwrite(info, self._restart(anew), anew)
@@ -149,6 +155,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         if ends and self.autoreset_mode == AutoresetMode.SAME_STEP:
             return self._same_step(reward, terminated, truncated, info)
         self._ended = truncated.copy()
+        self._show()
         infos = _masked(info)
         if ends:
             infos |= _masked(self._episode_info(truncated), truncated)
@@ -174,6 +181,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         infos["final_info"] = _masked(info | self._episode_info(truncated), truncated)
         infos["_final_info"] = truncated.copy()
         _overwrite(info, self._restart(truncated), truncated)
+        self._show()
         infos |= _masked(info)
         return self._observe(truncated), reward, terminated, truncated, infos
 
@@ -194,11 +202,20 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         return self.interface.action.masks(self.view)
 
     def render(self):
-        """A tuple of B frames (H, W, 3) uint8."""
-        if self.render_mode is None or self._state is None:
-            gym.logger.warn("render() needs render_mode='rgb_array' and a reset environment")
+        """A tuple of B frames (frame_px, frame_px, 3) uint8; in "human" mode None: reset and step show one window."""
+        if self._camera is None or self._state is None:
+            gym.logger.warn("render() needs render_mode='rgb_array' or 'human' and a reset environment")
             return None
-        return tuple(frame(self._state, self.scenario, row) for row in range(self.num_envs))
+        return self._camera.frames(self._state) if self.render_mode == "rgb_array" else None
+
+    def close_extras(self, **kwargs):
+        """Close the window, if there is one."""
+        if self._camera is not None:
+            self._camera.close()
+
+    def _show(self) -> None:
+        if self._camera is not None:
+            self._camera.show(self._state)
 
     def _observe(self, rows: np.ndarray | None = None):
         """The observation of all rows, of which only `rows` have changed since the last."""

@@ -1,0 +1,1 @@
+"""Frames: what `render()` returns and a window shows."""
