@@ -6,6 +6,9 @@ LAM ?=
 # An index of CPU wheels of torch, where the default index would bring a CUDA build: TORCH_INDEX="--index-url URL"
 TORCH_INDEX ?=
 
+# A process of tests for each core.
+PARALLEL ?= -n auto --dist loadgroup
+
 VENV := .venv
 RUN := $(VENV)/bin/python
 READY := $(VENV)/.ready
@@ -27,11 +30,11 @@ pretrained-%: $(READY)
 	cp out/pretrained/$*/policy.json out/pretrained/$*/policy.safetensors agents/pretrained/$*/
 
 test: $(READY)
-	$(RUN) -m pytest
+	$(RUN) -m pytest $(PARALLEL)
 
 # The studies that `make test` leaves out, a few minutes.
 slow: $(READY)
-	$(RUN) -m pytest -m slow
+	$(RUN) -m pytest $(PARALLEL) -m slow
 
 # Every toolkit's example in a virtual environment of its own, half an hour, most of it pip's; renews docs/toolkits.md.
 examples: $(READY)

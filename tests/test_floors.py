@@ -39,6 +39,7 @@ FLOORS = {
     "agents.sb3": 7,  # adapts the vector environment
     "wsn_env.evaluation": 7,
     "wsn_env.scoring": 7,
+    "wsn_env.pages": 8,
     "wsn_env.recorded_evaluation": 8,
     "wsn_env.ray_engine": 7,
     "wsn_env.reports": 7,

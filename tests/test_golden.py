@@ -83,6 +83,7 @@ def emulated():
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("emulated")  # the processes of one fixture
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="names x86 processors")
 @pytest.mark.parametrize("processor", PROCESSORS)
 def test_other_processors_give_the_same_bits_with_one_thread_and_with_two(processor, emulated):

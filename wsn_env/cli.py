@@ -1,4 +1,4 @@
-"""The command `wsn`, also `python -m wsn_env`: evaluate, calibrate, reproduce, compile."""
+"""The command `wsn`, also `python -m wsn_env`: evaluate, replay, calibrate, reproduce, compile."""
 
 from __future__ import annotations
 
@@ -48,6 +48,26 @@ class Evaluate:
 
 
 @dataclass
+class Replay:
+    """An episode as a page to play: one self-contained HTML file, one policy or two on the same random numbers."""
+
+    policy: list[str]
+    """One policy or two, as for evaluate."""
+    scenario: str = "PreDC-v0"
+    """Scenario id."""
+    seed: int = 2**31
+    """Of the episode: that of `reset(seed=...)`, and of the rows of an evaluation."""
+    lam: float | None = None
+    """Trade-off [m/mJ]; left out: the scenario's."""
+    set: list[str] = field(default_factory=list)
+    """Scenario quantities, as name=value."""
+    recording: Path | None = None
+    """With Ble-v0 a recorded track (*.mbd), calibrated on the others of its folder if there are any."""
+    out: Path = Path("replay.html")
+    """The page."""
+
+
+@dataclass
 class Calibrate:
     """Fit receivers, noise and losses to recorded Bluetooth tracks: parameter files for --set calibration=FILE, and a
     report."""
@@ -81,7 +101,13 @@ class Compile:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; bad input is one line on stderr and exit status 2, Ctrl-C is 130."""
-    runs = {Evaluate: run_evaluate, Calibrate: run_calibrate, Reproduce: run_reproduce, Compile: run_compile}
+    runs = {
+        Evaluate: run_evaluate,
+        Replay: run_replay,
+        Calibrate: run_calibrate,
+        Reproduce: run_reproduce,
+        Compile: run_compile,
+    }
     commands = {kind.__name__.lower(): kind for kind in runs}
     command = tyro.extras.subcommand_cli_from_dict(commands, prog="wsn", args=arguments)
     try:
@@ -161,6 +187,23 @@ def run_evaluate_recorded(command: Evaluate) -> None:
     if command.out:
         recorded_evaluation.save_recorded(evaluation, command.out)
         print(f"written: {', '.join(str(command.out / name) for name in recorded_evaluation.FILES)}")
+
+
+def run_replay(command: Replay) -> None:
+    """`wsn replay`."""
+    from wsn_env.evaluation import named_policies
+    from wsn_env.pages.replay_page import replay
+    from wsn_env.recorded_evaluation import replay_scenario
+
+    given = {} if command.lam is None else {"lam": command.lam}
+    scenario = make_scenario(command.scenario, command.set, [], **given)
+    if command.recording:
+        calibrated = any(pair.startswith("calibration=") for pair in command.set)
+        scenario = replay_scenario(scenario, command.recording, calibrated)
+    recorded = replay(named_policies(command.policy, scenario), scenario, command.seed, command.out)
+    for episode in recorded:
+        print(f"{episode.policy}: RMS {episode.rms_m:.3f} m, {episode.energy_mj:.4g} mJ a period")
+    print(f"written: {command.out} ({command.out.stat().st_size / 1000:.0f} kB)")
 
 
 def run_calibrate(command: Calibrate) -> None:

@@ -288,7 +288,7 @@ def evaluate(
     lams = tuple(dict.fromkeys(map(float, [scenario.lam] if lams is None else lams)))
     if not policies or not lams:
         raise ValueError("policies and lams must name at least one each")
-    named = policies if isinstance(policies, dict) else dict(_made(text, scenario) for text in policies)
+    named = policies if isinstance(policies, dict) else named_policies(policies, scenario)
     seeds = evaluation_seeds(seed, episodes)
     kept = _Kept(keep, _settings(scenario, named, lams, episodes, seed), list(named.values()))
     blocks: dict[tuple, Block] = {}
@@ -313,6 +313,11 @@ def evaluate(
                 row = {"policy": name, "scenario": scenario.name, "episode": episode, "seed": seeds[episode]} | values
                 rows.append({column: row[column] for column in COLUMNS})
     return Evaluation(scenario, tuple(named), lams, episodes, seed, rows)
+
+
+def named_policies(texts: Sequence[str], scenario: Scenario) -> dict[str, Policy]:
+    """Policies by label, from names, paths of saved policies, or "label=path"."""
+    return dict(_made(text, scenario) for text in texts)
 
 
 def _made(text: str, scenario: Scenario) -> tuple[str, Policy]:

@@ -15,13 +15,15 @@ from pathlib import Path
 
 import numpy as np
 
-from wsn_env.bluetooth.calibration import leave_one_out
-from wsn_env.bluetooth.dataset import read_dataset, track_files
+from wsn_env.bluetooth.calibration import calibrate, leave_one_out
+from wsn_env.bluetooth.dataset import DatasetError, read_dataset, track_files, track_name
 from wsn_env.evaluation import COLUMNS, Engine, Evaluation, evaluate, forget_blocks, stem_of, versions
 from wsn_env.files import replacing
 from wsn_env.progress import Progress
+from wsn_env.quantity import ScenarioError
 from wsn_env.reports import wide_console
 from wsn_env.scenario import Scenario
+from wsn_env.sections import Beacon
 
 FILES = ("tracks.csv", "tracks.json", "tracks.md", "tracks.png")
 REFERENCE = "all"
@@ -91,9 +93,10 @@ def evaluate_recorded(
         calibrated: the scenario's own calibration serves all tracks; else each is calibrated on all others.
 
     Raises:
-        ValueError: nothing to read, or too few tracks to leave one out.
+        ValueError: another scenario, nothing to read, or too few tracks to leave one out.
     """
-    paths = {path.name.removesuffix(".mbd").removesuffix("_all_sensors"): path for path in track_files(folder)}
+    _check_hears(scenario)
+    paths = {track_name(path): path for path in track_files(folder)}
     known = {name: scenario for name in paths}
     if not calibrated:
         if len(paths) < 2:
@@ -115,6 +118,34 @@ def evaluate_recorded(
             engine=engine,
         )
     return RecordedEvaluation(evaluations)
+
+
+def replay_scenario(scenario: Scenario, path: str | Path, calibrated: bool = False) -> Scenario:
+    """The replay of one track, calibrated on the others of its folder if there are any.
+
+    Args:
+        scenario: a Beacon scenario.
+        path: of the track.
+        calibrated: the scenario has its own calibration.
+
+    Raises:
+        ValueError: another scenario, or no such track.
+    """
+    _check_hears(scenario)
+    path = Path(path)
+    if not path.is_file():
+        raise DatasetError(f"{path}: is no file; a recorded track is a *.mbd file")
+    if not calibrated and len(track_files(path.parent)) > 1:
+        others = [track for track in read_dataset(path.parent) if track.name != track_name(path)]
+        scenario = scenario.override(**calibrate(others).quantities)
+    return _replay(scenario, track_name(path), path)
+
+
+def _check_hears(scenario: Scenario) -> None:
+    if not isinstance(scenario.measurement, Beacon):
+        raise ScenarioError(
+            f"scenario = {scenario.name!r}: has no receivers that hear a beacon; recorded tracks are for Ble-v0"
+        )
 
 
 def _replay(scenario: Scenario, name: str, path: Path) -> Scenario:

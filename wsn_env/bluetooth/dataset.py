@@ -318,10 +318,11 @@ def read_track(path: str | Path, receivers: Receivers | None = None) -> Track:
     arrays = time, places, packets[:, 1].copy(), packets[:, 2:].copy()
     for array in arrays:
         array.setflags(write=False)
-    return Track(_name(path), path, receivers, *arrays, counts, int(earlier.sum()))
+    return Track(track_name(path), path, receivers, *arrays, counts, int(earlier.sum()))
 
 
-def _name(path: Path) -> str:
+def track_name(path: Path) -> str:
+    """What a track's file is called, without its endings."""
     ending = next((ending for ending in ENDINGS if path.name.endswith(ending)), "")
     return path.name.removesuffix(ending)
 

@@ -1,0 +1,173 @@
+"""Pages: their numbers are the evaluation's, and they work in a browser from a file, without network."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from tests.browser import chromium, complaints
+from wsn_env import Scenario, evaluate, make_policy
+from wsn_env.bluetooth.synthetic import write_dataset
+from wsn_env.cli import main
+from wsn_env.evaluation import evaluation_seeds
+from wsn_env.pages.replay_page import replay
+from wsn_env.registration import IDS
+
+SEED = evaluation_seeds(0, 3)[2]
+TWO = {"Binary-v0": ("boundary", "nearest2"), "Underwater-v0": ("strongest_signal", "nearest2")}
+
+
+def data_of(path) -> dict:
+    """What a page's player shows."""
+    return json.loads(re.search(r'id="data">(.*?)</script>', path.read_text())[1])
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_a_replay_tells_what_the_evaluation_does(name, tmp_path):
+    scenario = Scenario.named(name)
+    policies = TWO.get(name, ("pre_dc" if scenario.radio.receiver == "head" else "all", "nearest2"))
+    out = tmp_path / "replay.html"
+    replay({policy: make_policy(policy, scenario) for policy in policies}, scenario, SEED, out)
+    assert out.stat().st_size < 500_000
+    rows = evaluate(list(policies), scenario, episodes=3).rows
+    data = data_of(out)
+    assert [episode["policy"] for episode in data["episodes"]] == list(policies)
+    for episode in data["episodes"]:
+        row = next(r for r in rows if r["seed"] == SEED and r["policy"] == episode["policy"])
+        assert episode["rms_m"] == pytest.approx(row["rms_m"])
+        assert episode["total"] == pytest.approx(row["return"])
+        frames = episode["frames"]
+        assert len(frames) == scenario.periods + 1
+        errors = np.array([frame["error"] for frame in frames[1 + scenario.unscored :]])
+        assert np.sqrt(np.mean(errors**2)) == pytest.approx(row["rms_m"], rel=1e-3)
+        assert sum(frame["energy"] for frame in frames[1:]) == pytest.approx(
+            row["energy_mj"] * scenario.periods, rel=1e-3
+        )
+        spent_uj = sum(spent for frame in frames[1:] for _, spent in frame["spent_uj"])
+        assert spent_uj / 1000 == pytest.approx(sum(frame["energy"] for frame in frames[1:]), rel=1e-2)
+
+
+def test_a_recorded_track_is_replayed(tmp_path, capsys):
+    write_dataset(tmp_path / "data", tracks=2, seconds=40)
+    track = sorted((tmp_path / "data").glob("*.mbd"))[0]
+    out = tmp_path / "page" / "replay.html"
+    command = ["replay", "--scenario", "Ble-v0", "--policy", "all", "strongest:n=3", "--recording", str(track)]
+    assert main([*command, "--out", str(out)]) == 0
+    assert "strongest:n=3: RMS" in capsys.readouterr().out
+    data = data_of(out)
+    assert len(data["nodes"]) == 2 * 12 and data["receiver"] == "sink"
+    assert all({frame["head"], *frame["members"]} >= set(range(12)) for frame in data["episodes"][0]["frames"][1:])
+
+
+@pytest.mark.parametrize(
+    "arguments,words",
+    [
+        (["--policy", "pre_dc", "random", "all"], ("one or two",)),
+        (["--policy", "pre_cd"], ("pre_cd", "pre_dc")),
+        (["--policy", "all", "--scenario", "Ble-v0", "--recording", "nowhere.mbd"], ("nowhere.mbd", "is no file")),
+        (["--policy", "pre_dc", "--recording", __file__], ("PreDC-v0", "Ble-v0")),
+        (["--policy", "pre_dc", "--set", "nodse=3"], ("nodse", "nodes")),
+        (["--policy", "pre_dc", "--seed", "-1"], ("seed", "-1")),
+    ],
+)
+def test_bad_input_is_one_line_and_leaves_no_page(arguments, words, tmp_path, capsys):
+    out = tmp_path / "replay.html"
+    assert main(["replay", *arguments, "--out", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert all(word in said for word in words) and said.count("\n") == 1
+    assert not out.exists()
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    with chromium(tmp_path_factory.mktemp("chromium")) as driver:
+        yield driver
+
+
+@pytest.fixture(scope="module")
+def opened(browser, tmp_path_factory):
+    """A replay of two policies, of which one has a name that would end a script."""
+    out = tmp_path_factory.mktemp("pages") / "replay.html"
+    scenario = Scenario.named("PreDC-v0")
+    names = {"pre_dc": "pre_dc", "</script><b>nearest": "nearest2"}
+    replay({label: make_policy(name, scenario) for label, name in names.items()}, scenario, 7, out)
+    browser.get(out.as_uri())
+    yield browser, data_of(out)
+    assert complaints(browser) == []
+
+
+def period(browser) -> int:
+    return int(re.match(r"period (\d+) of 100", browser.find_element("id", "period").text)[1])
+
+
+def keys(browser, *pressed):
+    from selenium.webdriver import ActionChains
+
+    ActionChains(browser).send_keys(*pressed).perform()
+
+
+def test_play_advances_and_pauses(opened):
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    browser, _ = opened
+    button = browser.find_element("id", "play")
+    button.click()
+    WebDriverWait(browser, 20).until(lambda browser: period(browser) >= 3)
+    assert button.text == "pause"
+    button.click()
+    at = period(browser)
+    assert button.text == "play"
+    assert browser.execute_async_script("setTimeout(arguments[0], 300)") is None and period(browser) == at
+
+
+def test_slider_and_keyboard_seek(opened):
+    from selenium.webdriver.common.keys import Keys
+
+    browser, data = opened
+    browser.execute_script(
+        "const slider = document.getElementById('slider'); slider.value = 42; slider.dispatchEvent(new Event('input'))"
+    )
+    assert period(browser) == 42
+    shown = [caption.text for caption in browser.find_elements("css selector", "figcaption")]
+    assert len(shown) == 2 and shown[1].startswith("</script><b>nearest")
+    for episode, text in zip(data["episodes"], shown):
+        assert f"error {episode['frames'][42]['error']:.2f} m" in text
+    keys(browser, Keys.ARROW_RIGHT, Keys.ARROW_RIGHT, Keys.ARROW_LEFT)
+    assert period(browser) == 43
+    keys(browser, Keys.END)
+    assert period(browser) == 100
+    keys(browser, Keys.HOME)
+    assert period(browser) == 0
+    slow = browser.find_element("id", "speed").get_attribute("value")
+    keys(browser, "+")
+    assert int(browser.find_element("id", "speed").get_attribute("value")) > int(slow)
+
+
+def test_hovering_shows_a_node(opened):
+    from selenium.webdriver import ActionChains
+
+    browser, data = opened
+    browser.execute_script("seek(30)")
+    head = data["episodes"][0]["frames"][30]["head"]
+    x, y, canvas = browser.execute_script(
+        "const [x, y] = scaleOf(views[0].canvas.getBoundingClientRect().width)(nodes[arguments[0]]);"
+        "return [x, y, views[0].canvas]",
+        head,
+    )
+    size = canvas.size
+    ActionChains(browser).move_to_element_with_offset(canvas, x - size["width"] / 2, y - size["height"] / 2).perform()
+    tip = browser.find_element("id", "tip")
+    assert tip.is_displayed() and "battery" in tip.text and "last in 30" in tip.text
+    ActionChains(browser).move_to_element(browser.find_element("id", "play")).perform()
+    assert not tip.is_displayed()
+
+
+def test_what_is_drawn_moves_with_time(opened):
+    browser, _ = opened
+    drawn = []
+    for to in (10, 60, 10):
+        browser.execute_script("seek(arguments[0])", to)
+        script = "return ['field0', 'field1', 'error', 'energy'].map((id) => document.getElementById(id).toDataURL())"
+        drawn.append(browser.execute_script(script))
+    assert all(a != b for a, b in zip(drawn[0], drawn[1])) and drawn[0] == drawn[2]

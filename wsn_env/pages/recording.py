@@ -1,0 +1,104 @@
+"""An episode as plain numbers, period by period: what a page shows of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wsn_env import draws
+from wsn_env.evaluation import episodes
+from wsn_env.policies import Policy
+from wsn_env.rendering.frame import shows_radius
+from wsn_env.scenario import Scenario
+from wsn_env.types import Outcome, State
+from wsn_env.world import World
+
+CLOUD = 120  # particles shown of a period
+FINE, COARSE = 9999, 999  # steps across the room: of lines and of clouds
+
+
+@dataclass(frozen=True)
+class Episode:
+    """One episode under one policy; lists lead with the periods done, 0 first."""
+
+    policy: str
+    frames: list[dict]
+    rms_m: float
+    energy_mj: float  # in a period
+    total: float  # return
+
+
+def record(name: str, policy: Policy, scenario: Scenario, seed: int) -> Episode:
+    """Play an episode, the very one of `reset(seed=seed)`.
+
+    Args:
+        scenario: with one lam.
+    """
+    world = World(scenario, threads=1)
+    frames, squares, joules, total = [], [], [], 0.0
+
+    def begin(state: State) -> None:
+        frames.append(_frame(state, None, scenario))
+
+    for state, outcome in episodes(policy, world, [seed], begin):
+        frames.append(_frame(state, outcome, scenario))
+        squares.append(outcome.error_m[0] ** 2)
+        joules.append(outcome.energy_mj[0])
+        total -= outcome.error_m[0] + state.lam[0] * outcome.energy_mj[0]
+    scored = squares[scenario.unscored :]
+    return Episode(name, frames, float(np.sqrt(np.mean(scored))), float(np.mean(joules)), float(total))
+
+
+def common(scenario: Scenario, seed: int) -> dict:
+    """What all policies share: the room, the nodes, the track."""
+    state = World(scenario, threads=1).reset([draws.key_of_seed(seed)])
+    width, depth = scenario.field.room_m
+    whole = max(width, depth)
+    receiver = scenario.radio.receiver
+    return {
+        "scenario": scenario.name,
+        "seed": seed,
+        "lam": float(state.lam[0]),
+        "period_s": scenario.period_s,
+        "room_m": [width, depth],
+        "unit_m": whole / FINE,
+        "coarse_m": whole / COARSE,
+        "radius_m": scenario.radius_m if shows_radius(scenario) else None,
+        "battery_j": scenario.radio.battery_j,
+        "receiver": receiver,
+        "nodes": _steps(state.network.positions[0], whole),
+        "track": _steps(state.track[0, :, ::2], whole),
+    }
+
+
+def _steps(points, whole: float, steps: int = FINE) -> list:
+    """Coordinates [m] as whole steps, x and y in turn."""
+    return np.rint(np.asarray(points, float) * (steps / whole)).astype(int).ravel().tolist()
+
+
+def _frame(state: State, outcome: Outcome | None, scenario: Scenario) -> dict:
+    """One period of row 0."""
+    whole = max(scenario.field.room_m)
+    network, belief, reports = state.network, state.belief.row[0], state.reports
+    x = state.belief.particles[0]
+    shown = slice(0, None, max(1, -(-x.shape[1] // CLOUD)))
+    count = 0 if outcome is None else int(state.ledger.count[0])
+    payers = state.ledger.payer[0, :count]
+    frame = {
+        "mean": _steps(belief["mean"][::2], whole),
+        "cov": [float(f"{belief['cov'][i, j]:.3g}") for i, j in ((0, 0), (0, 2), (2, 2))],
+        "cloud": _steps(np.clip(x[::2, shown].T, 0, whole), whole, COARSE),
+        "head": int(network.head[0]),
+        "members": network.members[0, : network.n_members[0]].tolist(),
+        "heard": reports.node[0, : reports.count[0]].tolist(),
+        "spent_uj": [[int(node), round(1e6 * state.ledger.spent_j[0, node], 1)] for node in payers],
+    }
+    if outcome is not None:
+        frame |= {
+            "error": round(float(outcome.error_m[0]), 3),
+            "energy": round(float(outcome.energy_mj[0]), 5),
+            "search": bool(outcome.searched[0]),
+            "handover": bool(outcome.handover[0]),
+        }
+    return frame

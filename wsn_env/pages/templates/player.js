@@ -1,0 +1,293 @@
+"use strict";
+// Okabe and Ito's palette: told apart by colour-blind eyes too.
+const HUE = { member: "#0072b2", head: "#d55e00", cloud: "#56b4e9", truth: "#009e73", report: "#e69f00", handover: "#cc79a7",
+  search: "#f0e442" };
+const SDS = 2.45; // of a Gaussian in two dimensions 95 % lie within so many
+const data = JSON.parse(document.getElementById("data").textContent);
+const episodes = data.episodes;
+const last = episodes[0].frames.length - 1;
+const nodes = pairs(data.nodes, data.unit_m);
+const track = pairs(data.track, data.unit_m);
+const whole = Math.max(...data.room_m);
+const element = (id) => document.getElementById(id);
+const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+let period = 0;
+let timer = null;
+
+const figure = (value) => (value >= 1000 ? Math.round(value).toLocaleString("en") : String(Number(value.toPrecision(3))));
+const joules = (mj) => (mj >= 1000 ? `${figure(mj / 1000)} J` : `${figure(mj)} mJ`);
+
+function pairs(flat, unit) {
+  const points = [];
+  for (let i = 0; i < flat.length; i += 2) points.push([flat[i] * unit, flat[i + 1] * unit]);
+  return points;
+}
+
+// What each node has left after each period, and when it was awake.
+for (const episode of episodes) {
+  const left = new Float64Array(nodes.length).fill(data.battery_j);
+  episode.left = episode.frames.map((frame) => {
+    for (const [node, spent] of frame.spent_uj) left[node] = Math.max(0, left[node] - 1e-6 * spent);
+    return Float64Array.from(left);
+  });
+  episode.awake = episode.frames.map((frame) => new Set(frame.head < 0 ? frame.members : [frame.head, ...frame.members]));
+  episode.least = Math.min(...left) / data.battery_j;
+}
+
+// --- fields ---
+
+const views = episodes.map((episode, number) => {
+  const figure = document.createElement("figure");
+  const caption = document.createElement("figcaption");
+  const name = document.createElement("b");
+  name.textContent = episode.policy;
+  const numbers = document.createElement("span");
+  caption.append(name, numbers);
+  const canvas = document.createElement("canvas");
+  canvas.id = `field${number}`;
+  canvas.setAttribute("role", "img");
+  canvas.setAttribute("aria-label", `field under ${episode.policy}`);
+  figure.append(caption, canvas);
+  element("fields").append(figure);
+  const view = { episode, canvas, numbers, hovered: -1 };
+  canvas.addEventListener("pointermove", (event) => hover(view, event));
+  canvas.addEventListener("pointerleave", () => { view.hovered = -1; element("tip").hidden = true; draw(); });
+  return view;
+});
+
+function sized(canvas) {
+  const ratio = window.devicePixelRatio || 1;
+  const box = canvas.getBoundingClientRect();
+  const width = Math.round(box.width * ratio), height = Math.round(box.height * ratio);
+  if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
+  const pen = canvas.getContext("2d");
+  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  pen.clearRect(0, 0, box.width, box.height);
+  return [pen, box.width, box.height];
+}
+
+function scaleOf(width) {
+  const margin = 12, scale = (width - 2 * margin) / whole;
+  const up = (whole - data.room_m[1]) / 2, right = (whole - data.room_m[0]) / 2;
+  return ([x, y]) => [margin + (x + right) * scale, width - margin - (y + up) * scale];
+}
+
+function disc(pen, [x, y], radius, fill, stroke) {
+  pen.beginPath();
+  pen.arc(x, y, radius, 0, 2 * Math.PI);
+  if (fill) { pen.fillStyle = fill; pen.fill(); }
+  if (stroke) { pen.strokeStyle = stroke; pen.stroke(); }
+}
+
+function line(pen, points, stroke, width, dash = []) {
+  pen.beginPath();
+  points.forEach(([x, y], i) => (i ? pen.lineTo(x, y) : pen.moveTo(x, y)));
+  pen.strokeStyle = stroke;
+  pen.lineWidth = width;
+  pen.setLineDash(dash);
+  pen.stroke();
+  pen.setLineDash([]);
+}
+
+function ellipse(pen, at, [xx, xy, yy], scale) {
+  const half = (xx + yy) / 2, off = (xx - yy) / 2, root = Math.hypot(off, xy);
+  const [major, minor] = [half + root, half - root].map((variance) => SDS * Math.sqrt(Math.max(variance, 0)) * scale);
+  pen.beginPath();
+  pen.ellipse(...at, major, minor, -0.5 * Math.atan2(2 * xy, xx - yy), 0, 2 * Math.PI);
+  pen.strokeStyle = colour("--ink");
+  pen.lineWidth = 1.5;
+  pen.stroke();
+}
+
+function drawField(view) {
+  const { episode } = view;
+  const frame = episode.frames[period], left = episode.left[period], awake = episode.awake[period];
+  const [pen, width] = sized(view.canvas);
+  const place = scaleOf(width), scale = (width - 24) / whole;
+  const [x0, y0] = place([0, data.room_m[1]]);
+  if (frame.search) {
+    pen.fillStyle = HUE.search + "50";
+    pen.fillRect(x0, y0, data.room_m[0] * scale, data.room_m[1] * scale);
+  }
+  pen.strokeStyle = colour("--line");
+  pen.lineWidth = 1;
+  pen.strokeRect(x0, y0, data.room_m[0] * scale, data.room_m[1] * scale);
+  if (data.radius_m) {
+    pen.save();
+    pen.beginPath();
+    pen.rect(x0, y0, data.room_m[0] * scale, data.room_m[1] * scale);
+    pen.clip();
+    for (const node of awake) disc(pen, place(nodes[node]), data.radius_m * scale, colour("--shade"));
+    pen.restore();
+  }
+  pen.fillStyle = HUE.cloud + "90";
+  for (const point of pairs(frame.cloud, data.coarse_m)) {
+    const [x, y] = place(point);
+    pen.fillRect(x - 1, y - 1, 2, 2);
+  }
+  const small = nodes.length > 400 ? 2 : 3;
+  nodes.forEach((at, node) => {
+    const share = (left[node] / data.battery_j - episode.least) / Math.max(1 - episode.least, 1e-9);
+    pen.globalAlpha = left[node] > 0 ? 0.35 + 0.65 * share : 0.25;
+    disc(pen, place(at), small, left[node] > 0 ? colour("--soft") : null, colour("--soft"));
+  });
+  pen.globalAlpha = 1;
+  const mean = [frame.mean[0] * data.unit_m, frame.mean[1] * data.unit_m];
+  const to = { head: nodes[frame.head], sink: [data.room_m[0] / 2, data.room_m[1] / 2], target: track[period] }[data.receiver];
+  if (to) for (const node of frame.heard) line(pen, [place(nodes[node]), place(to)], HUE.report, 1.5);
+  const leads = data.receiver === "head" && frame.head >= 0;
+  if (leads && frame.handover && episode.frames[period - 1].head >= 0)
+    line(pen, [place(nodes[episode.frames[period - 1].head]), place(nodes[frame.head])], HUE.handover, 3);
+  pen.lineWidth = 2;
+  for (const node of frame.heard) disc(pen, place(nodes[node]), leads && node === frame.head ? 10 : 8, null, HUE.report);
+  for (const node of awake) disc(pen, place(nodes[node]), 5, HUE.member);
+  if (leads) disc(pen, place(nodes[frame.head]), 7, HUE.head);
+  if (data.receiver === "sink") { const [x, y] = place(to); pen.fillStyle = HUE.head; pen.fillRect(x - 6, y - 6, 12, 12); }
+  const since = Math.max(0, period - 30);
+  line(pen, track.slice(since, period + 1).map(place), HUE.truth, 2.5);
+  line(pen, episode.frames.slice(since, period + 1).map((f) => place([f.mean[0] * data.unit_m, f.mean[1] * data.unit_m])),
+    colour("--ink"), 1, [3, 3]);
+  ellipse(pen, place(mean), frame.cov, scale);
+  pen.lineWidth = 3;
+  disc(pen, place(track[period]), 5.5, null, HUE.truth);
+  const [x, y] = place(mean);
+  line(pen, [[x - 6, y], [x + 6, y]], colour("--ink"), 2);
+  line(pen, [[x, y - 6], [x, y + 6]], colour("--ink"), 2);
+  if (view.hovered >= 0) { pen.lineWidth = 2; disc(pen, place(nodes[view.hovered]), 9, null, colour("--ink")); }
+  const spent = episode.frames.slice(1, period + 1).reduce((sum, f) => sum + f.energy, 0);
+  view.numbers.textContent = period === 0 ? "before the first period"
+    : `error ${frame.error.toFixed(2)} m · ${awake.size} awake · ${joules(spent)} so far`
+      + (frame.search ? " · search" : "") + (frame.handover ? " · handover" : "");
+}
+
+function hover(view, event) {
+  const box = view.canvas.getBoundingClientRect(), place = scaleOf(box.width);
+  const at = [event.clientX - box.left, event.clientY - box.top];
+  let best = -1, nearest = 14;
+  nodes.forEach((node, k) => {
+    const [x, y] = place(node), distance = Math.hypot(x - at[0], y - at[1]);
+    if (distance < nearest) { best = k; nearest = distance; }
+  });
+  view.hovered = best;
+  const tip = element("tip");
+  tip.hidden = best < 0;
+  if (best >= 0) {
+    const periods = view.episode.awake.slice(0, period + 1).map((set, k) => (set.has(best) ? k : -1)).filter((k) => k > 0);
+    const heard = view.episode.frames.slice(1, period + 1).filter((f) => f.heard.includes(best)).length;
+    const [x, y] = nodes[best];
+    tip.textContent = `node ${best} at (${x.toFixed(1)}, ${y.toFixed(1)}) m\n`
+      + `battery ${(100 * view.episode.left[period][best] / data.battery_j).toFixed(3)} %\n`
+      + `awake in ${periods.length} of ${period} periods${periods.length ? `, last in ${periods.at(-1)}` : ""}\n`
+      + `reported in ${heard}`;
+    tip.style.left = `${Math.min(event.clientX + 14, innerWidth - 270)}px`;
+    tip.style.top = `${event.clientY + 14}px`;
+  }
+  draw();
+}
+
+// --- curves ---
+
+const LINES = [HUE.head, HUE.member];
+
+function drawCurve(id, title, unit, large) {
+  const canvas = element(id), [pen, width, height] = sized(canvas);
+  const box = { left: 52, right: width - 8, top: 20, bottom: height - 18 };
+  let values = episodes.map((episode) => episode.frames.slice(1).map((frame) => frame[id]));
+  if (large && Math.max(...values.flat()) >= 1000) {
+    values = values.map((series) => series.map((value) => value / 1000));
+    unit = large;
+  }
+  const most = Math.max(...values.flat(), 1e-9);
+  const at = (k, value) => [box.left + (k / last) * (box.right - box.left),
+    box.bottom - (value / most / 1.05) * (box.bottom - box.top)];
+  pen.font = "12px system-ui, sans-serif";
+  pen.fillStyle = colour("--soft");
+  pen.fillText(`${title} [${unit}]`, box.left, 13);
+  pen.textAlign = "right";
+  for (const share of [0, 0.5, 1]) {
+    const y = at(0, share * most)[1];
+    line(pen, [[box.left, y], [box.right, y]], colour("--line"), 1);
+    pen.fillText(figure(share * most), box.left - 5, y + 4);
+  }
+  values.forEach((series, number) => line(pen, series.map((value, k) => at(k + 1, value)), LINES[number], 1.5));
+  line(pen, [[at(period, 0)[0], box.top], [at(period, 0)[0], box.bottom]], colour("--ink"), 1);
+  let right = box.right;
+  for (const number of [...episodes.keys()].reverse()) {
+    const name = episodes[number].policy;
+    pen.fillStyle = LINES[number];
+    pen.fillText(name, right, 13);
+    right -= pen.measureText(name).width + 12;
+  }
+  pen.textAlign = "left";
+  canvas.onclick = (event) => {
+    const share = (event.offsetX - box.left) / (box.right - box.left);
+    seek(Math.round(share * last));
+  };
+}
+
+// --- player ---
+
+function draw() {
+  views.forEach(drawField);
+  drawCurve("error", "error", "m");
+  drawCurve("energy", "energy", "mJ", "J");
+}
+
+function seek(to) {
+  period = Math.min(Math.max(to, 0), last);
+  element("slider").value = period;
+  element("period").textContent = `period ${period} of ${last}, ${(period * data.period_s).toFixed(0)} s`;
+  if (period === last) pause();
+  draw();
+}
+
+function pause() {
+  clearInterval(timer);
+  timer = null;
+  element("play").textContent = "play";
+}
+
+function play() {
+  if (timer) return pause();
+  if (period === last) seek(0);
+  element("play").textContent = "pause";
+  timer = setInterval(() => seek(period + 1), 1000 / Number(element("speed").value));
+}
+
+function faster(by) {
+  const speed = element("speed");
+  speed.selectedIndex = Math.min(Math.max(speed.selectedIndex + by, 0), speed.options.length - 1);
+  if (timer) { pause(); play(); }
+}
+
+const KEYS = { " ": play, ArrowLeft: () => seek(period - 1), ArrowRight: () => seek(period + 1), Home: () => seek(0),
+  End: () => seek(last), "+": () => faster(1), "-": () => faster(-1) };
+const alone = document.body.classList.contains("replay"); // in a report the page scrolls by these keys, too
+(alone ? document : element("player")).addEventListener("keydown", (event) => {
+  if (event.target.tagName === "SELECT" || event.ctrlKey || event.altKey || event.metaKey || !(event.key in KEYS)) return;
+  event.preventDefault();
+  KEYS[event.key]();
+});
+element("play").onclick = play;
+element("first").onclick = () => seek(0);
+element("back").onclick = () => seek(period - 1);
+element("next").onclick = () => seek(period + 1);
+element("last").onclick = () => seek(last);
+element("speed").onchange = () => faster(0);
+element("slider").max = last;
+element("slider").oninput = (event) => seek(Number(event.target.value));
+element("about").textContent = `lam = ${data.lam} m/mJ` + episodes.map((episode) =>
+  ` · ${episode.policy}: RMS ${episode.rms_m.toFixed(3)} m, ${joules(episode.energy_mj)} a period, return ${episode.total.toFixed(1)}`).join("");
+const words = [["truth", "target"], ["head", data.receiver === "sink" ? "sink" : "head"], ["member", "awake"], ["report", "report"],
+  ["cloud", "particles"], ["handover", "handover"], ["search", "search"]];
+for (const [hue, word] of words) {
+  if ((hue === "head" && data.receiver === "target") || (hue === "handover" && data.receiver !== "head")) continue;
+  const entry = document.createElement("span"), dot = document.createElement("i");
+  dot.style.background = HUE[hue];
+  entry.append(dot, word);
+  element("legend").append(entry);
+}
+element("legend").append("cross: estimate; ellipse: 95 %; " + (data.radius_m ? "shade: sensing range; " : "") + "grey: asleep, fading with its battery");
+new ResizeObserver(draw).observe(document.body);
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+seek(0);
