@@ -38,6 +38,8 @@ from wsn_env.files import replacing
 from wsn_env.interface import Settings
 from wsn_env.interface.features import BELIEF_FEATURES, CANDIDATE_FEATURES
 from wsn_env.interface.prospects import ENTRY_FEATURES
+from wsn_env.pages.report_page import write_report
+from wsn_env.pictures import write_picture
 from wsn_env.policies import make_policy, policy_names
 from wsn_env.progress import progress_bar
 from wsn_env.quantity import check_quantity, parse_overrides
@@ -172,7 +174,9 @@ def train(settings: Training) -> None:
     policy = save_policy(folder, network, speaks, facts)
     print(f"saved: {policy}")
     if settings.episodes:
-        compare(settings, scenario, policy)
+        compare(settings, scenario, policy, made)
+    else:
+        print(f"written: {write_report(folder, training=made)}")
 
 
 def complete(settings: Training) -> Scenario:
@@ -377,23 +381,32 @@ class Watch(BaseCallback):
         super().__init__()
         self._settings, self._folder, self._report = settings, folder, report
         self._saved = 0
-        self._rms: deque[float] = deque(maxlen=200)
+        self._rms: deque[float] = deque(maxlen=200)  # episodes
 
     def _on_step(self) -> bool:
         self._rms.extend(info["episode_rms_m"] for info in self.locals["infos"] if "episode_rms_m" in info)
         return True
 
     def _on_rollout_end(self) -> None:
-        rms = float(np.mean(self._rms)) if self._rms else float("nan")
+        rms, error = mean_and_error(self._rms)
         self.logger.record("rollout/episode_rms_m", rms)
+        self.logger.record("rollout/episode_rms_se_m", error)
+        self.logger.record("rollout/ep_rew_se", mean_and_error([info["r"] for info in self.model.ep_info_buffer])[1])
         self._report(min(self.num_timesteps, self._settings.steps), self._settings.steps, f"training, RMS {rms:.2f} m")
         if self.num_timesteps - self._saved >= self._settings.checkpoint_steps:
             save_checkpoint(self.model, self._folder)
             self._saved = self.num_timesteps
 
 
-def compare(settings: Training, scenario, policy: Path) -> None:
-    """Paired comparison with every baseline: table, CSV, JSON, picture."""
+def mean_and_error(values) -> tuple[float, float]:
+    """Of some numbers their mean and its standard error; NaN where there are too few."""
+    values = np.array(values, dtype=float)
+    mean = float(values.mean()) if len(values) else float("nan")
+    return mean, float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else float("nan")
+
+
+def compare(settings: Training, scenario, policy: Path, made: dict) -> None:
+    """Paired comparison with every baseline: table, CSV, JSON, picture, report."""
     folder = settings.folder
     lams = settings.lam if len(settings.lam) == 1 else scenario.lam_octaves
     policies = {"ppo": PPOPolicy(scenario, path=str(policy))}
@@ -406,8 +419,9 @@ def compare(settings: Training, scenario, policy: Path) -> None:
     save_markdown(evaluation, folder)
     forget_blocks(folder)
     print_tables(evaluation, reference="ppo")
-    draw_front(evaluation, lams[len(lams) // 2], folder / "comparison.png", emphasis="ppo")
-    print(f"written: {folder / 'evaluation.csv'}, {folder / 'comparison.png'}")
+    write_picture(folder / "comparison.png", draw_front(evaluation, lams[len(lams) // 2], emphasis="ppo"))
+    report = write_report(folder, evaluation, policies, made)
+    print(f"written: {folder / 'evaluation.csv'}, {folder / 'comparison.png'}, {report}")
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ from wsn_env import ClusterEnv, ClusterVectorEnv, Scenario, World, bounds, make_
 from wsn_env.bounds import Bound, bound_kind
 from wsn_env.evaluation import episodes, evaluate, evaluation_seeds, rollout
 from wsn_env.intervals import Summary
+from wsn_env.pictures import write_picture
 from wsn_env.reports import draw_front, markdown_table, print_tables
 
 PLAIN = dict(particles=50)
@@ -252,7 +253,7 @@ def test_tables_say_what_it_is(name, column, words, tmp_path, capsys):
     assert all(line.count("|") == head.count("|") for line in lines)
     print_tables(evaluation)
     assert words in " ".join(capsys.readouterr().out.split())
-    draw_front(evaluation, evaluation.lams[0], tmp_path / "front.png")
+    write_picture(tmp_path / "front.png", draw_front(evaluation, evaluation.lams[0]))
     row = evaluation.rows[0]
     assert (row["bound_m"] == "") == (row["floor_m"] == "") == (column is None)
     if column:

@@ -379,7 +379,7 @@ def test_the_command_writes_everything(tracks, monkeypatch, tmp_path, capsys):
 
 def test_the_command_leaves_out_what_it_is_told(tracks, monkeypatch, tmp_path):
     monkeypatch.setattr(report, "read_dataset", lambda folder: tracks)
-    monkeypatch.setattr(report, "draw_calibration", lambda *_: None)
+    monkeypatch.setattr(report, "write_picture", lambda *_, **__: None)
     report.run_calibrate(tmp_path, tmp_path / "out", "walk1", False)
     assert {path.name for path in (tmp_path / "out").glob("*.json")} == {"calibration.json", "without_walk1.json"}
     with pytest.raises(CalibrationError, match="'walk7': no such track; did you mean"):

@@ -10,6 +10,7 @@ import pytest
 from wsn_env import Scenario, View, make_policy
 from wsn_env.evaluation import BLOCK, COLUMNS, Evaluation, evaluate, evaluation_seeds
 from wsn_env.intervals import Summary
+from wsn_env.pictures import write_picture
 from wsn_env.reports import draw_front, markdown_table, print_tables, save_markdown
 
 SCENARIO = Scenario.named("PreDC-v0", particles=60, nodes=40, side_m=50.0, crossing_m=20.0, periods=8)
@@ -119,7 +120,7 @@ def test_tables_and_picture(evaluation, tmp_path):
     table = markdown_table(evaluation, 10.0, "pre_dc").splitlines()
     returns = [float(line.split("|")[2].split()[0]) for line in table[2:]]
     assert returns == sorted(returns, reverse=True) and len(returns) == 3
-    draw_front(evaluation, 10.0, tmp_path / "front.png", emphasis="nearest0")
+    write_picture(tmp_path / "front.png", draw_front(evaluation, 10.0, emphasis="nearest0"))
     assert (tmp_path / "front.png").read_bytes()[:4] == b"\x89PNG"
 
 

@@ -13,6 +13,7 @@ FLOORS = {
     "wsn_env.registration": 0,
     "wsn_env.progress": 0,
     "wsn_env.files": 0,
+    "wsn_env.pictures": 0,
     "wsn_env.intervals": 0,
     "wsn_env.quantity": 0,
     "wsn_env.sections": 1,

@@ -27,6 +27,7 @@ from wsn_env.front import (
 )
 from wsn_env.front_report import draw_fronts
 from wsn_env.intervals import Summary
+from wsn_env.pictures import write_picture
 from wsn_env.scenario import PRESETS
 
 SMALL = dict(particles=50, nodes=40, side_m=50.0, crossing_m=20.0, periods=6)
@@ -139,7 +140,7 @@ def test_csv_holds_the_points_and_json_the_hypervolumes(evaluation, tmp_path):
         means = np.array([[float(r["error_m"]), float(r["energy_mj"])] for r in rows if r["front"] == entry["front"]])
         assert entry["hypervolume"]["mean"] == pytest.approx(hypervolume(means, reference), rel=1e-12)
     assert saved["hypervolumes"][1]["thrifty7 minus it"] == vars(volumes[1].difference)
-    draw_fronts(evaluation, found, tmp_path / "front.png")
+    write_picture(tmp_path / "front.png", draw_fronts(evaluation, found))
     assert (tmp_path / "front.png").read_bytes()[:4] == b"\x89PNG"
 
 
@@ -176,6 +177,7 @@ def test_pareto_prints_tables_and_writes_files(tmp_path, capsys):
     assert "lam = 0.3 to 30 m/mJ, 3 paired episodes" in printed and "pre_dc minus it" in printed
     assert "nearest0..1" in printed and OTHERS in printed and "1.5 m and 0.4 mJ" in printed
     names = {f"evaluation.{kind}" for kind in ("csv", "json", "md")} | {f"front.{k}" for k in ("csv", "json", "png")}
+    names.add("report.html")
     assert {path.name for path in tmp_path.iterdir()} == names
     with open(tmp_path / "evaluation.csv") as file:
         assert len(list(csv.DictReader(file))) == 9 * 4 * 3

@@ -1,5 +1,6 @@
 """Pages: their numbers are the evaluation's, and they work in a browser from a file, without network."""
 
+import csv
 import json
 import re
 
@@ -12,6 +13,7 @@ from wsn_env.bluetooth.synthetic import write_dataset
 from wsn_env.cli import main
 from wsn_env.evaluation import evaluation_seeds
 from wsn_env.pages.replay_page import replay
+from wsn_env.pages.report_page import read_progress
 from wsn_env.registration import IDS
 
 SEED = evaluation_seeds(0, 3)[2]
@@ -77,6 +79,49 @@ def test_bad_input_is_one_line_and_leaves_no_page(arguments, words, tmp_path, ca
     said = capsys.readouterr().err
     assert all(word in said for word in words) and said.count("\n") == 1
     assert not out.exists()
+
+
+@pytest.fixture(scope="module")
+def reported(tmp_path_factory):
+    """A folder of an evaluation, its policies' rows by (policy, lam)."""
+    folder = tmp_path_factory.mktemp("evaluation")
+    command = ["evaluate", "--policies", "nearest1", "pre_dc", "nearest3", "--lam", "1", "10", "--episodes", "8"]
+    assert main([*command, "--set", "particles=300", "--out", str(folder)]) == 0
+    return folder
+
+
+def test_a_report_has_the_tables_and_the_worst_episode(reported):
+    text = (reported / "report.html").read_text()
+    for line in (reported / "evaluation.md").read_text().splitlines():
+        if line.startswith("| ") and "policy" not in line:
+            assert all(f">{cell.strip()}</td>" in text for cell in line.strip("|").split("|"))
+    with open(reported / "evaluation.csv", newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["policy"] == "nearest1" and float(row["lam"]) == 10.0]
+    worst = min(rows, key=lambda row: float(row["return"]))
+    data = data_of(reported / "report.html")
+    assert data["seed"] == int(worst["seed"]) and data["lam"] == 10.0
+    assert data["episodes"][0]["total"] == pytest.approx(float(worst["return"]))
+    assert "numpy" in text and f"{rows[0]['seed']} to {rows[-1]['seed']}" in text
+
+
+def test_without_matplotlib_there_is_no_report_but_all_else(tmp_path, monkeypatch):
+    monkeypatch.setattr("wsn_env.pictures.find_spec", lambda name: None)
+    assert main(["evaluate", "--policies", "nearest1", "--episodes", "2", "--out", str(tmp_path)]) == 0
+    assert {path.name for path in tmp_path.iterdir()} == {"evaluation.csv", "evaluation.json", "evaluation.md"}
+
+
+def test_a_training_is_read_in_the_order_of_its_steps(tmp_path):
+    """A run that was killed in the middle of a line, and resumed."""
+    for begins, text in {
+        0: "a,time/total_timesteps\n1.5,100\n,200\n2.",
+        200: "time/total_timesteps,b\n300,7\n",
+    }.items():
+        (tmp_path / f"progress-{begins}").mkdir()
+        (tmp_path / f"progress-{begins}" / "progress.csv").write_text(text)
+    progress = read_progress(tmp_path)
+    assert np.array_equal(progress["time/total_timesteps"], [100, 200, 300])
+    assert np.array_equal(progress["a"], [1.5, np.nan, np.nan], equal_nan=True)
+    assert np.array_equal(progress["b"], [np.nan, np.nan, 7], equal_nan=True)
 
 
 @pytest.fixture(scope="module")
@@ -171,3 +216,16 @@ def test_what_is_drawn_moves_with_time(opened):
         script = "return ['field0', 'field1', 'error', 'energy'].map((id) => document.getElementById(id).toDataURL())"
         drawn.append(browser.execute_script(script))
     assert all(a != b for a, b in zip(drawn[0], drawn[1])) and drawn[0] == drawn[2]
+
+
+def test_a_report_opens_with_its_pictures_and_plays(browser, reported):
+    browser.get((reported / "report.html").as_uri())
+    widths = browser.execute_script("return [...document.images].map((image) => image.naturalWidth)")
+    assert len(widths) == 3 and min(widths) > 100
+    keys(browser, "+", " ")  # the page's own
+    assert browser.find_element("id", "play").text == "play"
+    browser.execute_script("document.getElementById('player').focus()")
+    keys(browser, " ")
+    assert browser.find_element("id", "play").text == "pause"
+    keys(browser, " ")
+    assert [each for each in complaints(browser) if not each["name"].startswith("data:")] == []

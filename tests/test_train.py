@@ -30,9 +30,10 @@ def run(tmp_path_factory) -> Path:
 
 
 def test_a_run_leaves_its_files(run):
-    files = "config.json policy.json policy.safetensors checkpoint.zip evaluation.csv evaluation.json comparison.png"
-    for name in files.split():
+    files = "config.json policy.json policy.safetensors checkpoint.zip evaluation.csv evaluation.json report.html"
+    for name in [*files.split(), "comparison.png"]:
         assert (run / name).stat().st_size > 0, name
+    assert "<h2>Learning</h2>" in (run / "report.html").read_text()
     progress = next(run.glob("progress-*"))
     assert (progress / "progress.csv").exists() and list(progress.glob("events.out.tfevents.*"))
     assert not [path.name for path in run.iterdir() if path.name.startswith(".")]

@@ -124,9 +124,11 @@ def main(arguments: list[str] | None = None) -> int:
 
 def run_evaluate(command: Evaluate) -> None:
     """`wsn evaluate`."""
-    from wsn_env.evaluation import evaluate, forget_blocks
+    from wsn_env.evaluation import evaluate, forget_blocks, named_policies
     from wsn_env.front import check_front_libraries, lam_sweep
     from wsn_env.front_report import FRONT_FILES, report_front
+    from wsn_env.pages.report_page import write_report
+    from wsn_env.pictures import can_draw
     from wsn_env.ray_engine import on_ray
     from wsn_env.reports import print_tables, save_markdown
 
@@ -140,9 +142,10 @@ def run_evaluate(command: Evaluate) -> None:
     if command.pareto:
         check_front_libraries(pictures=command.out is not None)
         lams = lams or lam_sweep(scenario)
+    policies = named_policies(command.policies, scenario)
     with progress_bar() as report:
         evaluation = evaluate(
-            command.policies,
+            policies,
             scenario,
             lams,
             command.episodes,
@@ -159,7 +162,9 @@ def run_evaluate(command: Evaluate) -> None:
         evaluation.save(command.out)
         save_markdown(evaluation, command.out)
         forget_blocks(command.out)
-        names = ("evaluation.csv", "evaluation.json", *(FRONT_FILES if command.pareto else ()))
+        names = ["evaluation.csv", "evaluation.json", *(FRONT_FILES if command.pareto else ())]
+        if can_draw():
+            names.append(write_report(command.out, evaluation, policies).name)
         print(f"written: {', '.join(str(command.out / name) for name in names)}")
 
 

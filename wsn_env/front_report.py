@@ -8,7 +8,6 @@ from pathlib import Path
 from textwrap import fill
 
 from wsn_env.evaluation import Evaluation
-from wsn_env.files import replacing
 from wsn_env.front import (
     Fronts,
     Point,
@@ -20,7 +19,8 @@ from wsn_env.front import (
     reference_point,
     save_front,
 )
-from wsn_env.reports import interval_text, wide_console
+from wsn_env.pictures import write_picture
+from wsn_env.reports import draw_floor, interval_text, wide_console
 
 FRONT_FILES = ("front.csv", "front.json", "front.png")
 
@@ -41,7 +41,7 @@ def report_front(evaluation: Evaluation, out: Path | None = None) -> None:
     print_hypervolumes(volumes, reference)
     if out is not None:
         save_front(evaluation, found, volumes, out)
-        draw_fronts(evaluation, found, out / "front.png")
+        write_picture(out / "front.png", draw_fronts(evaluation, found))
 
 
 def print_front(evaluation: Evaluation, found: Fronts) -> None:
@@ -83,22 +83,17 @@ def print_hypervolumes(volumes: list[Volume], reference: tuple[float, float]) ->
     wide_console().print(table)
 
 
-def draw_fronts(evaluation: Evaluation, found: Fronts, path: str | Path) -> None:
-    """Picture of mean error against energy: a line through each front, and the reference point's box.
+def draw_fronts(evaluation: Evaluation, found: Fronts):
+    """Figure of mean error against energy: a line through each front, and the reference point's box.
 
     Energy is logarithmic, so is the error where it spans much. What lies beyond the box is named below the axes.
-
-    Args:
-        path: a PNG file.
     """
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
+    from matplotlib.figure import Figure
 
     error, energy = reference_point(evaluation.scenario)
     top, right = error * MARGIN, energy * MARGIN
-    figure, axes = plt.subplots(figsize=(9, 6), layout="constrained")
+    figure = Figure(figsize=(9, 6), layout="constrained")
+    axes = figure.subplots()
     axes.set(xscale="log", yscale="log", title=_title(evaluation))
     beyond = []
     for (name, points), colour, marker, over in zip(found.items(), cycle(COLOURS), cycle(MARKERS), count(3, -0.01)):
@@ -109,6 +104,7 @@ def draw_fronts(evaluation: Evaluation, found: Fronts, path: str | Path) -> None
     left = min((point.energy.low for point in drawn if point.energy.low > 0), default=energy / 10) / MARGIN
     bottom = min((point.error.low for point in drawn if point.error.low > 0), default=error / 10) / MARGIN**0.5
     axes.plot([left, energy, energy], [error, error, bottom], "--", color=BOX, linewidth=1, zorder=1)
+    draw_floor(axes, evaluation)
     corner = dict(xytext=(-4, 5), textcoords="offset points", ha="right")
     axes.annotate("reference point", (energy, error), color=BOX, fontsize=9, **corner)
     if top < NARROW * bottom:
@@ -124,9 +120,7 @@ def draw_fronts(evaluation: Evaluation, found: Fronts, path: str | Path) -> None
     axes.set_xlabel(f"energy [mJ per period]\n{lines}".rstrip())
     axes.grid(alpha=0.3, which="both", linewidth=0.5)
     axes.legend(frameon=False, loc="lower left")
-    with replacing(path) as temporary:
-        figure.savefig(temporary, dpi=140, format="png")
-    plt.close(figure)
+    return figure
 
 
 def _digits(scale: float) -> int:

@@ -19,6 +19,7 @@ from wsn_env.bluetooth.calibration import calibrate, leave_one_out
 from wsn_env.bluetooth.dataset import DatasetError, read_dataset, track_files, track_name
 from wsn_env.evaluation import COLUMNS, Engine, Evaluation, evaluate, forget_blocks, stem_of, versions
 from wsn_env.files import replacing
+from wsn_env.pictures import write_picture
 from wsn_env.progress import Progress
 from wsn_env.quantity import ScenarioError
 from wsn_env.reports import wide_console
@@ -245,24 +246,22 @@ def save_recorded(evaluation: RecordedEvaluation, out: str | Path) -> None:
         path.write_text(json.dumps({"tracks": settings, "versions": versions()}, indent=1))
     with replacing(out / "tracks.md") as path:
         path.write_text(markdown(evaluation))
-    draw_recorded(evaluation, out / "tracks.png")
+    write_picture(out / "tracks.png", draw_recorded(evaluation))
     for name in evaluation.by_track:
         forget_blocks(out / "tracks" / name)
         (out / "tracks" / name).rmdir()
     (out / "tracks").rmdir()
 
 
-def draw_recorded(evaluation: RecordedEvaluation, path: str | Path) -> None:
-    """Picture of RMS against energy: families as lines, single policies as points, one for each lam that they see."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
+def draw_recorded(evaluation: RecordedEvaluation):
+    """Figure of RMS against energy: families as lines, single policies as points, one for each lam that they see."""
+    from matplotlib.figure import Figure
 
     lams, policies = evaluation.first.lams, evaluation.first.policies
     lam = lams[0]
     stems = evaluation.first.families()
-    figure, axes = plt.subplots(figsize=(8, 5.2), layout="constrained")
+    figure = Figure(figsize=(8, 5.2), layout="constrained")
+    axes = figure.subplots()
     colours = iter(("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#F0E442"))
     for stem in stems:
         members = evaluation.family(stem, lam)
@@ -293,6 +292,4 @@ def draw_recorded(evaluation: RecordedEvaluation, path: str | Path) -> None:
     axes.grid(alpha=0.3)
     if stems:
         axes.legend(frameon=False)
-    with replacing(path) as temporary:
-        figure.savefig(temporary, dpi=140, format="png")
-    plt.close(figure)
+    return figure

@@ -117,22 +117,20 @@ def save_markdown(evaluation: Evaluation, folder: str | Path) -> None:
         path.write_text("\n".join(parts))
 
 
-def draw_front(evaluation: Evaluation, lam: float, path: str | Path, emphasis: str | None = None) -> None:
-    """Picture of mean error against energy with intervals, and the curve of equal return through one policy.
+def draw_front(evaluation: Evaluation, lam: float, emphasis: str | None = None):
+    """Figure of mean error against energy with intervals, and the curve of equal return through one policy.
 
     Policies that differ by a number at the end of their names are joined by a line, and labelled by the number. The
     floor of all nodes awake is drawn as the mean error of a round Gaussian of its RMS (sqrt(pi) / 2 of it).
 
     Args:
-        path: a PNG file.
+        lam: one of the evaluation's.
         emphasis: the policy to make stand out.
     """
-    import matplotlib
+    from matplotlib.figure import Figure
 
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(figsize=(8, 5.2), layout="constrained")
+    figure = Figure(figsize=(8, 5.2), layout="constrained")
+    axes = figure.subplots()
     points = {}
     for policy in evaluation.policies:
         s = evaluation.summary(policy, lam)
@@ -143,11 +141,7 @@ def draw_front(evaluation: Evaluation, lam: float, path: str | Path, emphasis: s
             (points[policy][0].mean, points[policy][1].mean) for policy in points if stem_of(policy) == stem
         )
         axes.plot(*zip(*family), color=FAMILY, linewidth=1, label=f"{stem}0, 1, ...", zorder=1)
-    floor = evaluation.floor_m()
-    if floor is not None:
-        kind = {"bound": "floor", "reference": "reference"}[bound_kind(evaluation.scenario)]
-        label = f"{kind}: all nodes, {floor:.3g} m RMS"
-        axes.axhline(ROUND * floor, color=FLOOR, linewidth=1, linestyle=":", label=label)
+    draw_floor(axes, evaluation)
     axes.set_xscale("log")
     if emphasis is not None:
         energy, error = points[emphasis]
@@ -162,9 +156,16 @@ def draw_front(evaluation: Evaluation, lam: float, path: str | Path, emphasis: s
     axes.set_ylabel("mean error [m]")
     axes.set_title(f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes")
     axes.grid(alpha=0.3)
-    with replacing(path) as temporary:
-        figure.savefig(temporary, dpi=140, format="png")
-    plt.close(figure)
+    return figure
+
+
+def draw_floor(axes, evaluation: Evaluation) -> None:
+    """A line at the mean error of a round Gaussian of the floor's RMS, if there is a bound."""
+    floor = evaluation.floor_m()
+    if floor is not None:
+        kind = {"bound": "floor", "reference": "reference"}[bound_kind(evaluation.scenario)]
+        label = f"{kind}: all nodes, {floor:.3g} m RMS"
+        axes.axhline(ROUND * floor, color=FLOOR, linewidth=1, linestyle=":", label=label)
 
 
 def _draw_point(axes, policy: str, energy, error, strong: bool) -> None:

@@ -26,6 +26,7 @@ from wsn_env.bluetooth.calibration import (
 from wsn_env.bluetooth.dataset import Track, read_dataset
 from wsn_env.bluetooth.residual_map import residual_map, save_map
 from wsn_env.files import replacing
+from wsn_env.pictures import write_picture
 from wsn_env.quantity import suggest
 from wsn_env.reports import wide_console
 
@@ -80,7 +81,7 @@ def report_calibration(tracks: Sequence[Track], whole: Calibration, parts: Seque
     text = "\n".join(_markdown(tracks, whole, parts))
     with replacing(out / REPORT_FILES[0]) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
-    draw_calibration(tracks, whole, out / REPORT_FILES[1])
+    write_picture(out / REPORT_FILES[1], draw_calibration(tracks, whole), dpi=120)
 
 
 def print_calibration(whole: Calibration, parts: Sequence[Calibration]) -> None:
@@ -153,22 +154,15 @@ def local_deviation(packets: Packets, residual: np.ndarray) -> np.ndarray:
     return deviation
 
 
-def draw_calibration(tracks: Sequence[Track], calibration: Calibration, path: str | Path) -> None:
-    """Picture of what the calibration was fitted to: levels, autocovariance, white part and losses.
-
-    Args:
-        path: a PNG file.
-    """
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
+def draw_calibration(tracks: Sequence[Track], calibration: Calibration):
+    """Figure of what the calibration was fitted to: levels, autocovariance, white part and losses."""
+    from matplotlib.figure import Figure
 
     packets = gather(tracks)
     residual = residuals(packets, calibration)
     names = calibration.found["receivers"]
     rows = -(-len(names) // COLUMNS)
-    figure = plt.figure(figsize=(13, 2.1 * rows + 8.2), layout="constrained")
+    figure = Figure(figsize=(13, 2.1 * rows + 8.2), layout="constrained")
     upper, lower = figure.subfigures(2, 1, height_ratios=(2.1 * rows + 0.6, 7.6))
     _draw_levels(upper, rows, packets, calibration)
     panels = lower.subplots(2, 2)
@@ -180,9 +174,7 @@ def draw_calibration(tracks: Sequence[Track], calibration: Calibration, path: st
     for axes in panels.flat:
         axes.grid(alpha=0.3, linewidth=0.5)
         axes.spines[["top", "right"]].set_visible(False)
-    with replacing(path) as temporary:
-        figure.savefig(temporary, dpi=120, format="png")
-    plt.close(figure)
+    return figure
 
 
 def _draw_levels(figure, rows: int, packets: Packets, calibration: Calibration) -> None:

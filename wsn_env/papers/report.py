@@ -8,7 +8,6 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
@@ -17,6 +16,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from wsn_env.files import replacing
+from wsn_env.pictures import NEEDED, can_draw
 from wsn_env.reports import wide_console
 
 HOLDS = "holds"
@@ -80,8 +80,8 @@ def prepare(out: Path) -> None:
     Raises:
         ValueError: when either cannot be.
     """
-    if find_spec("matplotlib") is None:
-        raise ValueError("pictures need matplotlib: pip install 'wsn_env[plot]'")
+    if not can_draw():
+        raise ValueError(NEEDED)
     try:
         out.mkdir(parents=True, exist_ok=True)
         with TemporaryFile(dir=out):
@@ -117,12 +117,6 @@ def write_expected(path: Path, expected: Iterable[Expectation]) -> None:
     """expected.csv: quantity, expected, tolerance, measured, within."""
     rows = [(e.quantity, e.expected, e.tolerance, e.measured, e.within) for e in expected]
     write_sheet(path, Sheet(("quantity", "expected", "tolerance", "measured", "within"), rows))
-
-
-def write_picture(path: Path, figure) -> None:
-    """A matplotlib figure as PNG."""
-    with replacing(path) as temporary:
-        figure.savefig(temporary, format="png", dpi=150)
 
 
 def new_axes(title: str, x: str, y: str):

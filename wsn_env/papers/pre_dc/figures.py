@@ -8,9 +8,10 @@ import numpy as np
 
 from wsn_env.papers.colours import BLACK, BLUE, GREEN, GREY, VERMILION
 from wsn_env.papers.pre_dc.systems import MOTIONS, PARTICLES, SYSTEMS, Results
-from wsn_env.papers.report import Sheet, by_period, new_axes, tidy, write_picture, write_sheet
+from wsn_env.papers.report import Sheet, by_period, new_axes, tidy, write_sheet
 from wsn_env.papers.rollout import standard_error
 from wsn_env.physics.sensing import detection_probability
+from wsn_env.pictures import write_picture
 from wsn_env.sections import Detection
 
 STATIC, EKF, PRE_DC = VERMILION, BLUE, BLACK

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from wsn_env.papers.colours import BLUE, GREEN, GREY, PURPLE, SKY, VERMILION, YELLOW
-from wsn_env.papers.report import Sheet, by_period, new_axes, write_picture, write_sheet
+from wsn_env.papers.report import Sheet, by_period, new_axes, write_sheet
 from wsn_env.papers.rollout import Record
 from wsn_env.papers.underwater.claims import energy_j
 from wsn_env.papers.underwater.systems import (
@@ -22,6 +22,7 @@ from wsn_env.papers.underwater.systems import (
     lost,
 )
 from wsn_env.physics.acoustics import absorption_db_per_km, ambient_noise_db
+from wsn_env.pictures import write_picture
 from wsn_env.scenario import Scenario
 from wsn_env.types import PURPOSES
 
