@@ -1,18 +1,34 @@
 """Pictures of every scenario and of every policy's choice, for the site: frames of the environment itself.
 
-python docs/pictures.py FOLDER
+python docs/pictures.py FOLDER    also makes episode.gif, the README's
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+import numpy as np
 from PIL import Image
 
 from wsn_env import Scenario, View, World, draws, make_policy
 from wsn_env.registration import IDS
 from wsn_env.rendering.camera import Camera
+from wsn_env.rendering.frame import (
+    BLUE,
+    FLASH,
+    FULL,
+    GREEN,
+    INK,
+    ORANGE,
+    PURPLE,
+    SENSED,
+    SIZE,
+    SKY,
+    VERMILLION,
+    YELLOW,
+)
 
 SEED, PERIODS = 7, 25
 POLICIES = (  # where a policy is at home
@@ -25,16 +41,39 @@ POLICIES = (  # where a policy is at home
 HOME = {"Binary-v0": "boundary", "Anchors-v0": "nearest2", "Underwater-v0": "strongest_signal", "Ble-v0": "informed3"}
 
 
-def draw(name: str, policy: str, path: Path) -> None:
-    """A frame of an episode under a policy, after PERIODS periods."""
+def frames(name: str, policy: str, seed: int, periods: int, size: int = SIZE) -> Iterator[np.ndarray]:
+    """A frame after every period of an episode."""
     scenario = Scenario.named(name)
-    world, chooser, camera = World(scenario), make_policy(policy, scenario), Camera(scenario)
-    state, outcome = world.restart(world.allocate(1), [True], [draws.key_of_seed(SEED)])
+    world, chooser, camera = World(scenario), make_policy(policy, scenario), Camera(scenario, frame_px=size)
+    state, outcome = world.restart(world.allocate(1), [True], [draws.key_of_seed(seed)])
     camera.begin(state, outcome, [True])
-    for _ in range(PERIODS):
+    for _ in range(periods):
         state, outcome = world.step(state, chooser.act(View.of(state)))
         camera.add(state, outcome)
-    Image.fromarray(camera.frames(state)[0]).save(path)
+        yield camera.frames(state)[0]
+
+
+def draw(name: str, policy: str, path: Path) -> None:
+    """A frame of an episode under a policy, after PERIODS periods."""
+    *_, last = frames(name, policy, SEED, PERIODS)
+    Image.fromarray(last).save(path)
+
+
+def film(path: Path, policies: Sequence[str] = ("pre_dc", "ppo"), seed: int = 3, periods: int = 60) -> None:
+    """An animated GIF of an episode under policies side by side."""
+    colours = Image.new("P", (1, 1))
+    colours.putpalette(palette())
+    together = zip(*(frames("PreDC-v0", policy, seed, periods, size=400) for policy in policies))
+    pictures = [Image.fromarray(np.hstack(pair)).quantize(palette=colours, dither=0) for pair in together]
+    pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=120, loop=0)
+
+
+def palette() -> list[int]:
+    """The colours of frames, each in steps towards white, so that none is lost to those that cover more."""
+    inks = (INK, BLUE, VERMILLION, ORANGE, GREEN, SKY, PURPLE)
+    steps = np.linspace(0, 1, 8)[:, None, None]
+    blended = np.array(inks) * (1 - steps) + 255 * steps
+    return [*blended.reshape(-1).astype(int).tolist(), *np.ravel([FULL, FLASH, YELLOW, *SENSED]).tolist()]
 
 
 def draw_all(folder: Path) -> None:
@@ -50,3 +89,4 @@ def draw_all(folder: Path) -> None:
 
 if __name__ == "__main__":
     draw_all(Path(sys.argv[1]))
+    film(Path(sys.argv[1]) / "episode.gif")
