@@ -10,6 +10,7 @@ TORCH_INDEX ?=
 PARALLEL ?= -n auto --dist loadgroup
 
 VENV := .venv
+PIP := --quiet --disable-pip-version-check --no-compile
 RUN := $(VENV)/bin/python
 READY := $(VENV)/.ready
 
@@ -49,7 +50,7 @@ bench-short: $(READY)
 	$(RUN) -m benchmarks --short
 
 $(VENV)/.bench: $(READY)
-	$(RUN) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[test,bench]"
+	$(RUN) -m pip install $(PIP) -c constraints.txt -e ".[test,bench]"
 	touch $@
 
 # The documentation site, warnings as errors; out/docs/index.html.
@@ -57,7 +58,7 @@ docs: $(VENV)/.docs
 	$(VENV)/bin/sphinx-build -q -W --keep-going -b html docs out/docs
 
 $(VENV)/.docs: $(READY)
-	$(RUN) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[test,docs]"
+	$(RUN) -m pip install $(PIP) -c constraints.txt -e ".[test,docs]"
 	touch $@
 
 lint: $(READY)
@@ -65,8 +66,8 @@ lint: $(READY)
 
 $(READY): pyproject.toml constraints.txt Makefile
 	$(PYTHON) -m venv $(VENV)
-	$(RUN) -m pip install --quiet --disable-pip-version-check torch==2.13.0 $(TORCH_INDEX) -c constraints.txt
-	$(RUN) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[test]"
+	$(RUN) -m pip install $(PIP) torch==2.13.0 $(TORCH_INDEX) -c constraints.txt
+	$(RUN) -m pip install $(PIP) -c constraints.txt -e ".[test]"
 	$(RUN) -m wsn_env compile
 	touch $@
 

@@ -14,6 +14,7 @@ from wsn_env.ray_engine import on_ray
 
 SCENARIO = Scenario.named("PreDC-v0", particles=50, nodes=40, side_m=50.0, crossing_m=20.0, periods=10)
 ROOT = os.path.dirname(os.path.dirname(__file__))
+pytestmark = pytest.mark.xdist_group("ray")  # one cluster at a time
 
 
 @pytest.fixture

@@ -97,6 +97,7 @@ def test_a_stopped_training_goes_on(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("ray")
 def test_rllib_trains_the_same_network_and_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
     pytest.importorskip("ray")
     settings = dict(SHORT, engine="ray", runners=1, episodes=0, name="short", runs=tmp_path)

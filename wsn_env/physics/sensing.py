@@ -191,13 +191,13 @@ def expected_strengths(points, nodes, measurement: Measurement):
     return _over_offsets(points, nodes, measurement)[1]
 
 
-def strength_slopes(points, nodes, measurement: Measurement):
-    """How the strengths of `expected_strengths` change with x and y [1/m]; 0 nearer than the floor.
+def linearised_strengths(points, nodes, measurement: Measurement):
+    """The strengths of `expected_strengths`, and how they change with x and y [1/m]; 0 nearer than the floor.
 
-    Returns: (..., n, 2).
+    Returns: (..., n) and (..., n, 2).
     """
-    offset, _, slopes = _over_offsets(points, nodes, measurement)
-    return slopes[..., None] * offset
+    offset, strengths, slopes = _over_offsets(points, nodes, measurement)
+    return strengths, slopes[..., None] * offset
 
 
 def _over_offsets(points, nodes, measurement: Measurement):

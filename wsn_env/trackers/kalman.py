@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wsn_env.physics.sensing import expected_strengths, strength_slopes
+from wsn_env.physics.sensing import expected_strengths, linearised_strengths
 from wsn_env.scenario import Scenario
 from wsn_env.sections import Level, Measurement, Position
 from wsn_env.trackers.base import MomentTracker
@@ -58,19 +58,10 @@ class EKFTracker(MomentTracker):
                 value, HJacobian=lambda x: POSITION_ROWS, Hx=lambda x: x[[0, 2]], R=variance * np.eye(2)
             )
             return
-        self._filter.update(
-            value[:1],
-            HJacobian=lambda x: self._strength(x, node)[1],
-            Hx=lambda x: self._strength(x, node)[0],
-            R=np.array([[variance]]),
-        )
-
-    def _strength(self, x: np.ndarray, node: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Strength (1,) at a state, and its slope (1, 4); flat nearer than the floor."""
-        at = x[[0, 2]], node[None], self._measurement
+        expected, slope = linearised_strengths(self._filter.x[[0, 2]], node[None], self._measurement)
         row = np.zeros((1, 4))
-        row[:, [0, 2]] = strength_slopes(*at)
-        return expected_strengths(*at), row
+        row[:, [0, 2]] = slope
+        self._filter.update(value[:1], HJacobian=lambda x: row, Hx=lambda x: expected, R=np.array([[variance]]))
 
 
 class UKFTracker(MomentTracker):

@@ -10,7 +10,7 @@ import numpy as np
 
 from wsn_env.papers.rollout import Record, Trial, play_all
 from wsn_env.physics.field import fixed_positions
-from wsn_env.physics.sensing import strength_slopes
+from wsn_env.physics.sensing import linearised_strengths
 from wsn_env.progress import Progress
 from wsn_env.scenario import RING_OF_EIGHT, Scenario
 from wsn_env.sections import Detection, Legs, Rssi
@@ -93,7 +93,8 @@ def cramer_rao_bound(anchors: str, points: np.ndarray, noise_db: float = NOISE_D
     Returns: (K,) m.
     """
     scenario = scenario_as_read("snapshot", positions=ANCHORS[anchors])
-    slopes = strength_slopes(points, fixed_positions(scenario.field), scenario.measurement) / noise_db
+    _, slopes = linearised_strengths(points, fixed_positions(scenario.field), scenario.measurement)
+    slopes = slopes / noise_db
     information = np.swapaxes(slopes, -1, -2) @ slopes
     return np.sqrt(np.trace(np.linalg.inv(information), axis1=-2, axis2=-1))
 
