@@ -31,9 +31,9 @@ pretrained-%: $(READY)
 	cp out/pretrained/$*/policy.json out/pretrained/$*/policy.safetensors agents/pretrained/$*/
 
 test: $(READY)
-	$(RUN) -m pytest $(PARALLEL)
+	$(RUN) -m pytest $(PARALLEL) $(if $(SLOW),-m "slow or not slow")
 
-# The studies that `make test` leaves out, a few minutes.
+# The studies that `make test` leaves out, a few minutes; `make test SLOW=1` runs all.
 slow: $(READY)
 	$(RUN) -m pytest $(PARALLEL) -m slow
 

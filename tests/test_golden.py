@@ -1,9 +1,10 @@
-"""The same bits everywhere: a digest of whole episodes, for any number of threads and any processor.
+"""The same bits everywhere: a digest of whole episodes, for any number of threads and any processor; compiled once.
 
 A change of the physics, the filter or the draws changes the digests; then `python -m tests.test_golden` prints new
 ones, and CHANGELOG.md says why.
 """
 
+import functools
 import hashlib
 import os
 import platform
@@ -61,37 +62,95 @@ PROCESSORS = {
 }
 
 
+# A processor that nothing has been compiled for: `wsn compile` first, then `PLAY`, then the digests as on the others.
+FRESH = "nehalem"
+PLAY = """
+import gymnasium as gym, wsn_env
+from wsn_env.cli import main
+for keywords in (dict(action="menu", observation="dict", order="information"), dict(action="subset", fast=True)):
+    env = gym.make("wsn_env/PreDC-v0", particles=60, periods=30, radius_m=3.0, **keywords)
+    env.action_space.seed(0)
+    env.reset(seed=0)
+    for _ in range(30):
+        env.step(env.action_space.sample())
+envs = gym.make_vec("wsn_env/Rssi-v0", num_envs=20, vectorization_mode="vector_entry_point", particles=60)
+envs.reset(seed=0)
+envs.step(envs.action_space.sample())
+for scenario in ("PreDC-v0", "Binary-v0", "Anchors-v0", "Underwater-v0"):
+    policies = "pre_dc random centroid nearest2 boundary strongest_signal greedy adaptive_informed".split()
+    main(["evaluate", "--scenario", scenario, "--episodes", "3", "--policies", *policies, "--set", "particles=60"])
+for scenario, trackers in {
+    "Binary-v0": ("boundary", "boundary_ekf", "centroid_rls"),
+    "Anchors-v0": ("ckf", "ickf", "trilateration", "grnn_kf"),
+    "Underwater-v0": ("ekf", "ukf", "snapshot"),
+}.items():
+    for tracker in trackers:
+        kept = ["silent_information=false", "resampling=systematic"]
+        quantities = ["particles=60", "periods=4", f"tracker={tracker}", *kept]
+        main(["evaluate", "--scenario", scenario, "--episodes", "2", "--policies", "all", "--set", *quantities])
+env = gym.make("wsn_env/Binary-v0", order="value", particles=60, start="search", render_mode="rgb_array")
+env.reset(seed=0)
+env.render()
+"""
+
+
 @pytest.fixture(scope="module")
-def emulated():
-    """{processor: its process}, all at once: each compiles for a minute the first time, on a core of its own."""
+def emulated(tmp_path_factory):
+    """What each processor's process has said, by a function of its name; all at once, since they compile for a minute."""
     started = {}
     for processor, lacks in PROCESSORS.items():
         lacking = [unit for unit in __cpu_dispatch__ if __cpu_features__[unit] and lacks(unit)]
-        units = {"NUMBA_CPU_FEATURES": "", "NPY_DISABLE_CPU_FEATURES": " ".join(lacking)}
+        units = {"NUMBA_CPU_FEATURES": "", "NPY_DISABLE_CPU_FEATURES": " ".join(lacking), "NUMBA_CPU_NAME": processor}
+        if processor == FRESH:
+            units["NUMBA_CACHE_DIR"] = str(tmp_path_factory.mktemp("kernels"))
         started[processor] = subprocess.Popen(
-            [sys.executable, "-m", "tests.test_golden"],
-            env=os.environ | units | {"NUMBA_CPU_NAME": processor},
+            [sys.executable, "-m", "tests.test_golden", *([FRESH] if processor == FRESH else [])],
+            env=os.environ | units,
             stdout=subprocess.PIPE,
             text=True,
             cwd=HERE,
         )
-    yield started
+
+    @functools.cache
+    def said(processor):
+        lines = started[processor].communicate()[0].splitlines()
+        assert started[processor].returncode == 0
+        return lines
+
+    yield said
     for process in started.values():
         process.kill()
         process.wait()
 
 
-@pytest.mark.slow
-@pytest.mark.xdist_group("emulated")  # the processes of one fixture
-@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="names x86 processors")
-@pytest.mark.parametrize("processor", PROCESSORS)
+elsewhere = [
+    pytest.mark.slow,
+    pytest.mark.xdist_group("emulated"),  # the processes of one fixture
+    pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="names x86 processors"),
+]
+
+
+@pytest.mark.parametrize("processor", [pytest.param(name, marks=elsewhere) for name in PROCESSORS])
 def test_other_processors_give_the_same_bits_with_one_thread_and_with_two(processor, emulated):
-    said, _ = emulated[processor].communicate()
     lines = [f"{name} {threads} {hash}" for name, hash in GOLDEN.items() for threads in (1, 2)]
-    assert emulated[processor].returncode == 0 and said.splitlines() == lines
+    assert emulated(processor)[-len(lines) :] == lines
+
+
+@pytest.mark.parametrize("processor", [pytest.param(FRESH, marks=elsewhere)])
+def test_after_wsn_compile_nothing_is_compiled_any_more(processor, emulated):
+    assert emulated(processor)[:2] == ["wsn compile: compiling", "play: nothing to compile"]
+
+
+def first_time() -> None:
+    """Whether the first process compiles, and whether the second does."""
+    for name, command in {"wsn compile": ["-m", "wsn_env", "compile"], "play": ["-c", PLAY]}.items():
+        done = subprocess.run([sys.executable, *command], capture_output=True, text=True, check=True)
+        print(f"{name}: {'compiling' if 'compiling (once' in done.stderr else 'nothing to compile'}")
 
 
 if __name__ == "__main__":
+    if sys.argv[1:] == [FRESH]:
+        first_time()
     for name in GOLDEN:
         for threads in (1, 2):
             print(name, threads, digest(name, 12, threads))
