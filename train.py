@@ -40,7 +40,7 @@ from wsn_env.interface.features import BELIEF_FEATURES, CANDIDATE_FEATURES
 from wsn_env.interface.prospects import ENTRY_FEATURES
 from wsn_env.pages.report_page import write_report
 from wsn_env.pictures import write_picture
-from wsn_env.policies import make_policy, policy_names
+from wsn_env.policies import Policy, make_policy, policy_names
 from wsn_env.progress import progress_bar
 from wsn_env.quantity import check_quantity, parse_overrides
 from wsn_env.reports import draw_front, print_tables, save_markdown
@@ -158,6 +158,7 @@ def train(settings: Training) -> None:
     """The whole story."""
     scenario = complete(settings)
     check(settings)
+    rules = opponents(scenario) if settings.episodes else {}
     torch.set_num_threads(settings.torch_threads)
     speaks = Settings(
         action=settings.action,
@@ -174,7 +175,7 @@ def train(settings: Training) -> None:
     policy = save_policy(folder, network, speaks, facts)
     print(f"saved: {policy}")
     if settings.episodes:
-        compare(settings, scenario, policy, made)
+        compare(settings, scenario, {"ppo": PPOPolicy(scenario, path=str(policy))} | rules, made)
     else:
         print(f"written: {write_report(folder, training=made)}")
 
@@ -405,12 +406,22 @@ def mean_and_error(values) -> tuple[float, float]:
     return mean, float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else float("nan")
 
 
-def compare(settings: Training, scenario, policy: Path, made: dict) -> None:
+def opponents(scenario: Scenario) -> dict[str, Policy]:
+    """Every installed policy by name; one that cannot be made is left out, and said."""
+    made = {}
+    for name in policy_names():
+        try:
+            if name not in SLOW:
+                made[name] = make_policy(name, scenario)
+        except ValueError as problem:
+            print(f"train.py: left out of the comparison: {problem}", file=sys.stderr)
+    return made
+
+
+def compare(settings: Training, scenario: Scenario, policies: dict[str, Policy], made: dict) -> None:
     """Paired comparison with every baseline: table, CSV, JSON, picture, report."""
     folder = settings.folder
     lams = settings.lam if len(settings.lam) == 1 else scenario.lam_octaves
-    policies = {"ppo": PPOPolicy(scenario, path=str(policy))}
-    policies |= {name: make_policy(name, scenario) for name in policy_names() if name not in SLOW}
     with progress_bar() as report:
         evaluation = evaluate(
             policies, scenario, lams, settings.episodes, settings.evaluation_seed, keep=folder, progress=report

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from wsn_env.cli import main
 from wsn_env.policies import policy_names
 from wsn_env.registration import IDS
 
@@ -20,10 +21,24 @@ def test_links_lead_somewhere(page):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_python_samples_run_in_order(page):
+def test_python_samples_run_in_order(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     names = {}
     for sample in re.findall(r"```python\n(.*?)```", page.read_text(), flags=re.S):
         exec(compile(sample.replace("episodes=100", "episodes=3"), page.name, "exec"), names)
+
+
+def test_the_tutorials_policy_joins_a_comparison(tmp_path, monkeypatch, capsys):
+    """As it says: the first block in mine.py, then the commands."""
+    text = (ROOT / "docs" / "tutorials.md").read_text()
+    monkeypatch.chdir(tmp_path)
+    Path("mine.py").write_text(re.search(r"```python\n(.*?)```", text, flags=re.S)[1])
+    commands = re.findall(r"python -m wsn_env (.*mine.py.*)", text)
+    for command in commands:
+        assert main([*command.split(), *(["--episodes", "2"] if command.startswith("evaluate") else [])]) == 0
+    assert len(commands) == 2 and Path("replay.html").exists()
+    rows = Path("out/mine/evaluation.csv").read_text()
+    assert all(f"\n{label}," in rows for label in ("mine.py:Cautious", "cautious", "pre_dc"))
 
 
 def test_the_readme_is_short():

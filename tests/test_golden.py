@@ -96,7 +96,7 @@ env.render()
 
 @pytest.fixture(scope="module")
 def emulated(tmp_path_factory):
-    """What each processor's process has said, by a function of its name; all at once, since they compile for a minute."""
+    """What each processor's process has said, by a function of its name; all run at once, compiling for a minute."""
     started = {}
     for processor, lacks in PROCESSORS.items():
         lacking = [unit for unit in __cpu_dispatch__ if __cpu_features__[unit] and lacks(unit)]

@@ -13,7 +13,9 @@ from agents.boundary import Boundary
 from agents.nearest import Nearest
 from agents.pre_dc import PreDC
 from agents.strongest_signal import StrongestSignal
-from wsn_env import Scenario, View, World, draws, make_policy
+from wsn_env import Scenario, View, World, draws, evaluate, make_policy
+from wsn_env.cli import main
+from wsn_env.evaluation import BLOCKS_FILE
 from wsn_env.physics.sensing import detection_probability
 from wsn_env.policies import policy_names
 from wsn_env.types import Cluster
@@ -305,3 +307,82 @@ def test_parameters_of_the_published_policies_are_checked():
     ):
         with pytest.raises(ValueError, match=message):
             make_policy(name, SCENARIO)
+
+
+OWN = """
+import numpy as np
+from agents.base import ViewPolicy
+from wsn_env import Cluster
+
+class Mine(ViewPolicy):
+    def act(self, view):
+        nodes, _ = view.nearest(2)
+        return Cluster(nodes[:, 0], nodes.astype(np.int32))
+
+class Broken(Mine):
+    def act(self, view):
+        cluster = super().act(view)
+        return Cluster(cluster.head, np.concatenate([cluster.members, cluster.head], axis=1))
+
+class Nodes(Mine):
+    def act(self, view):
+        return Cluster(super().act(view).head + 1000, super().act(view).members)
+
+class Array(Mine):
+    def act(self, view):
+        return np.zeros(3)
+
+class Alone:
+    def act(self, view):
+        return None
+
+class Idle:
+    def __init__(self, scenario):
+        pass
+"""
+
+
+@pytest.mark.parametrize(
+    "policy,words",
+    [
+        ("mine.py:Mine:reach=3", ("Mine", "reach")),
+        ("mine.py:Mina", ("Mina", "did you mean Mine")),
+        ("mine.py", ("mine.py:CLASS",)),
+        ("yours.py:Mine", ("no file yours.py",)),
+        ("mine.py:Broken", ("mine.py:14: ", "dimensions")),
+        ("mine.py:Nodes", ("Nodes.act", "chose node 1", "below 225")),
+        ("mine.py:Array", ("Array.act", "ndarray", "Cluster(head, members)")),
+        ("mine.py:Alone", ("mine.py:Alone", "takes no arguments")),
+        ("mine.py:Idle", ("mine.py:Idle", "act(view)")),
+        ("runs/nowhere", ("runs/nowhere", "does not exist")),
+        ("a=nearest0 a=nearest3", ("'a'", "twice")),
+    ],
+)
+def test_mistakes_in_a_policy_of_ones_own_are_told_in_a_line(policy, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.py").write_text(OWN)
+    assert main(["evaluate", "--policies", *policy.split(), "--episodes", "2"]) == 2
+    said = capsys.readouterr().err.strip()
+    assert "\n" not in said and all(word in said for word in words)
+
+
+def test_a_file_that_was_edited_is_played_anew(tmp_path, monkeypatch):
+    """Kept blocks of a stopped run are of the old text."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.py").write_text(OWN)
+    scenario = Scenario.named("PreDC-v0", particles=50, periods=3)
+    mine = {"mine": make_policy("mine.py:Mine", scenario)}
+    kept = [evaluate(mine, scenario, episodes=2, keep=tmp_path) and (tmp_path / BLOCKS_FILE).read_text()]
+    (tmp_path / "mine.py").write_text(OWN + "# another text\n")
+    kept += [evaluate(mine, scenario, episodes=2, keep=tmp_path) and (tmp_path / BLOCKS_FILE).read_text()]
+    assert kept[0].splitlines()[0] != kept[1].splitlines()[0]
+    assert kept[0].splitlines()[1:] == kept[1].splitlines()[1:]
+
+
+def test_what_was_not_compared_is_told():
+    scenario = Scenario.named("PreDC-v0", particles=50, periods=3)
+    with pytest.raises(ValueError, match="Nearest is no name"):
+        evaluate([make_policy("nearest2", scenario)], scenario)
+    evaluation = evaluate(["nearest2", "all"], scenario, episodes=2)
+    with pytest.raises(ValueError, match="'nearest3' at lam = 4.0: compared were nearest2, all at 4"):
+        evaluation.difference("nearest3", "all", 4.0)

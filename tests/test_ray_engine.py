@@ -65,6 +65,24 @@ def test_a_worker_that_is_killed_costs_a_retry(tmp_path):
         ray.shutdown()
 
 
+@pytest.mark.slow
+def test_policies_of_a_file_travel_to_the_workers(tmp_path):
+    ray = pytest.importorskip("ray")
+    (tmp_path / "mine.py").write_text(
+        "from wsn_env import make_policy\n"
+        "class Mine:\n"
+        "    def __init__(self, scenario):\n        self.other = make_policy('nearest2', scenario)\n"
+        "    def act(self, view):\n        return self.other.act(view)\n"
+    )
+    ray.init(num_cpus=1, log_to_driver=False)
+    try:
+        own = f"mine={tmp_path}/mine.py:Mine"
+        spread = evaluate([own, "nearest2"], SCENARIO, [4.0], 3, engine=on_ray())
+        assert list(spread.values("mine", 4.0, "return")) == list(spread.values("nearest2", 4.0, "return"))
+    finally:
+        ray.shutdown()
+
+
 class _Suicidal:
     """Pre-DC, but kill -9 to the first process that plays it."""
 

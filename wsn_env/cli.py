@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+import traceback
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
@@ -23,8 +24,8 @@ class Evaluate:
     scenario: str = "PreDC-v0"
     """Scenario id."""
     policies: list[str] = field(default_factory=lambda: ["pre_dc", "centroid", "static_cluster"])
-    """Policies by name, or paths of a saved policy.json, also as label=path; the first is the reference of the
-    differences."""
+    """Policies by name, FILE.py:CLASS, or paths of a saved policy.json, also as label=path; parameters after a colon.
+    The first is the reference of the differences."""
     lam: list[float] | None = None
     """Trade-offs between error and energy [m/mJ]; left out: the scenario's, or with --pareto nine about it."""
     pareto: bool = False
@@ -113,13 +114,23 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         runs[type(command)](command)
     except (ValueError, OSError, MemoryError) as problem:
-        print(f"wsn: {problem}", file=sys.stderr)
+        print(f"wsn: {place_of(problem)}{problem}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         kept = isinstance(command, Evaluate) and command.out
         print("wsn: stopped" + ("; the same command continues where it was" if kept else ""), file=sys.stderr)
         return 130
     return 0
+
+
+def place_of(problem: Exception) -> str:
+    """Where it arose, if that is in a file of the user's own: "mine.py:12: "."""
+    others = [Path(__file__).parents[1] / "wsn_env", Path(__file__).parents[1] / "agents", sys.prefix, sys.base_prefix]
+    for frame in reversed(traceback.extract_tb(problem.__traceback__)):
+        path = Path(frame.filename)
+        if path.is_file() and not any(path.is_relative_to(folder) for folder in others):
+            return f"{path}:{frame.lineno}: "
+    return ""
 
 
 def run_evaluate(command: Evaluate) -> None:
@@ -162,7 +173,7 @@ def run_evaluate(command: Evaluate) -> None:
         evaluation.save(command.out)
         save_markdown(evaluation, command.out)
         forget_blocks(command.out)
-        names = ["evaluation.csv", "evaluation.json", *(FRONT_FILES if command.pareto else ())]
+        names = ["evaluation.csv", "evaluation.json", "evaluation.md", *(FRONT_FILES if command.pareto else ())]
         if can_draw():
             names.append(write_report(command.out, evaluation, policies).name)
         print(f"written: {', '.join(str(command.out / name) for name in names)}")

@@ -31,7 +31,7 @@ from wsn_env.policies import Policy, make_policy
 from wsn_env.progress import Progress
 from wsn_env.quantity import suggest
 from wsn_env.scenario import Scenario
-from wsn_env.types import Outcome, State
+from wsn_env.types import Cluster, Outcome, State
 from wsn_env.view import View
 from wsn_env.world import World
 
@@ -65,6 +65,9 @@ class Evaluation:
 
     def values(self, policy: str, lam: float, column: str) -> np.ndarray:
         """(episodes,) in the order of the seeds, so that two policies' values are pairs."""
+        if (policy, lam) not in self._rows_of:
+            lams = ", ".join(f"{each:g}" for each in self.lams)
+            raise ValueError(f"policy {policy!r} at lam = {lam!r}: compared were {', '.join(self.policies)} at {lams}")
         return np.array([row[column] for row in self._rows_of[policy, lam]])
 
     def summary(self, policy: str, lam: float) -> dict[str, Summary]:
@@ -160,8 +163,20 @@ def episodes(
     if begin is not None:
         begin(state)
     for _ in range(world.scenario.periods):
-        state, outcome = world.step(state, policy.act(View.of(state)), donate=True)
+        cluster = _checked(policy.act(View.of(state)), policy, world.scenario.field.nodes)
+        state, outcome = world.step(state, cluster, donate=True)
         yield state, outcome
+
+
+def _checked(cluster: Cluster, policy: Policy, nodes: int) -> Cluster:
+    """What a policy chose; the world would drop and count nodes that do not exist, here they are a mistake."""
+    if not isinstance(cluster, Cluster):
+        chose = type(cluster).__name__
+        raise ValueError(f"{type(policy).__name__}.act: returned a {chose}: must be a Cluster(head, members)")
+    highest = max(np.max(cluster.head), np.max(cluster.members, initial=-1))
+    if highest >= nodes:
+        raise ValueError(f"{type(policy).__name__}.act: chose node {highest}: must be below {nodes}")
+    return cluster
 
 
 def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict]:
@@ -269,8 +284,8 @@ def evaluate(
     """Paired comparison of policies.
 
     Args:
-        policies: names, paths of saved policies, or "label=path"; or name -> Policy. The first is the reference of
-            differences. One with `sees_lam = False` plays once for all lams.
+        policies: as for `named_policies`, or name -> Policy. The first is the reference of differences. One
+            with `sees_lam = False` plays once for all lams.
         scenario: what they act in.
         lams: the trade-offs [m/mJ]; None: the scenario's, which must then be a single one.
         episodes: common random episodes for each policy and lam.
@@ -316,8 +331,22 @@ def evaluate(
 
 
 def named_policies(texts: Sequence[str], scenario: Scenario) -> dict[str, Policy]:
-    """Policies by label, from names, paths of saved policies, or "label=path"."""
-    return dict(_made(text, scenario) for text in texts)
+    """Policies by label, from names, paths of saved policies, "FILE.py:Class", or "label=" and any of these.
+
+    Raises:
+        ValueError: for an unknown policy, or two with one label.
+    """
+    named: dict[str, Policy] = {}
+    for text in dict.fromkeys(texts):
+        if not isinstance(text, str):
+            raise ValueError(
+                f"policies: {type(text).__name__} is no name: give policies of your own as {{name: policy}}"
+            )
+        label, policy = _made(text, scenario)
+        if label in named:
+            raise ValueError(f"policies: {label!r} is there twice: labels must differ")
+        named[label] = policy
+    return named
 
 
 def _made(text: str, scenario: Scenario) -> tuple[str, Policy]:

@@ -1,4 +1,4 @@
-"""Policies by name, from every installed package's entry points in the group `wsn_env.policies`.
+"""Policies by name, from every installed package's entry points in the group `wsn_env.policies`, and from files.
 
 A package of one's own adds `my_rule = "my_package.rules:MyRule"` there: a callable that takes the Scenario and returns
 an object with `act(view) -> Cluster`.
@@ -7,7 +7,9 @@ an object with `act(view) -> Cluster`.
 from __future__ import annotations
 
 import json
+import sys
 from importlib.metadata import entry_points
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Protocol
 
@@ -17,6 +19,7 @@ from wsn_env.types import Cluster
 from wsn_env.view import View
 
 GROUP = "wsn_env.policies"
+OF_FILES = "wsn_env_policies_of_file_"  # so begin the names of modules that are files given by path
 
 
 class Policy(Protocol):
@@ -32,32 +35,67 @@ def policy_names() -> list[str]:
 
 
 def make_policy(name: str, scenario: Scenario, **parameters) -> Policy:
-    """A policy by name, or a learned one from the policy.json that train.py saved.
+    """A policy by name, one of your own from a file, or a learned one from the policy.json that train.py saved.
 
     Args:
-        name: an entry point's name, with parameters after a colon if any ("pre_dc:theta=0.8,phi0_m=3"), or a path to a
-            policy.json (or its folder).
+        name: an entry point's name or "FILE.py:Class", with parameters after a colon if any
+            ("pre_dc:theta=0.8,phi0_m=3", "mine.py:TwoBest:sharp_m=2"); or a path to a policy.json (or its folder).
         scenario: what it will act in.
         parameters: of the policy, for example `make_policy("pre_dc", scenario, theta=0.8)`.
 
     Raises:
-        ValueError: for an unknown name or parameter.
+        ValueError: for an unknown name, class or parameter.
     """
-    plain, colon, text = name.partition(":")
+    file, own, rest = name.partition(".py:")
+    plain, colon, text = (rest if own else name).partition(":")
+    if own:
+        return _made(name, _class_in(Path(f"{file}.py"), plain), scenario, parameters | _given(colon, text))
     for point in entry_points(group=GROUP):
         if point.name == plain:
-            given = parse_overrides(text.split(",")) if colon else {}
             try:
-                return point.load()(scenario=scenario, **parameters | given)
-            except TypeError as problem:
-                if not given:
-                    raise
-                raise ValueError(f"policy {name!r}: {problem}") from None
+                made_by = point.load()
+            except (ImportError, AttributeError) as problem:
+                raise ValueError(f"policy {name!r}: its entry point {point.value!r} fails: {problem}") from None
+            return _made(name, made_by, scenario, parameters | _given(colon, text))
     path = Path(name)
     path = path / "policy.json" if path.is_dir() else path
-    if path.suffix == ".json":
+    if path.suffix == ".py":
+        raise ValueError(f"policy {name!r}: which class of it? {name}:CLASS")
+    if path.suffix == ".json" or len(path.parts) > 1:
         return load_learned(path, scenario)
-    raise ValueError(f"policy {name!r} is unknown: {suggest(name, policy_names())} (or the path of a policy.json)")
+    ways = "(or FILE.py:CLASS, or the path of a policy.json)"
+    raise ValueError(f"policy {name!r} is unknown: {suggest(name, policy_names())} {ways}")
+
+
+def _given(colon: str, text: str) -> dict:
+    return parse_overrides(text.split(",")) if colon else {}
+
+
+def _made(name: str, made_by, scenario: Scenario, parameters: dict) -> Policy:
+    try:
+        policy = made_by(scenario=scenario, **parameters)
+    except TypeError as problem:
+        raise ValueError(f"policy {name!r}: cannot be made with a scenario and its parameters: {problem}") from problem
+    if not callable(getattr(policy, "act", None)):
+        raise ValueError(f"policy {name!r}: has no act(view)")
+    return policy
+
+
+def _class_in(path: Path, name: str):
+    """A class of a Python file, which is read once."""
+    if not path.is_file():
+        raise ValueError(f"policy {f'{path}:{name}'!r}: there is no file {path}")
+    file = str(path.resolve())
+    module_name = OF_FILES + path.stem
+    module = sys.modules.get(module_name)
+    if module is None or module.__file__ != file:
+        spec = spec_from_file_location(module_name, file)
+        module = sys.modules[module_name] = module_from_spec(spec)
+        spec.loader.exec_module(module)
+    if not hasattr(module, name):
+        known = [each for each, value in vars(module).items() if getattr(value, "__module__", None) == module_name]
+        raise ValueError(f"policy {f'{path}:{name}'!r}: the file has no such class: {suggest(name, known)}")
+    return getattr(module, name)
 
 
 def load_learned(path: Path, scenario: Scenario) -> Policy:
@@ -72,5 +110,7 @@ def load_learned(path: Path, scenario: Scenario) -> Policy:
         raise ValueError(f"{path} is not a saved policy: its kind is {kind!r}, known are {', '.join(policy_names())}")
     try:
         return make_policy(kind, scenario, path=str(path))
-    except TypeError:
-        raise ValueError(f"{path} is not a saved policy: its kind {kind!r} is not learned") from None
+    except ValueError as problem:
+        if isinstance(problem.__cause__, TypeError):
+            raise ValueError(f"{path} is not a saved policy: its kind {kind!r} is not learned") from None
+        raise

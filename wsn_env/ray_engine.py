@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import socket
+import sys
 from collections.abc import Iterator, Sequence
 
 from wsn_env.evaluation import Block, Engine, in_this_process
+from wsn_env.policies import OF_FILES
 
 AHEAD = 4  # tasks a core that wait their turn
 PATIENCE_S = 5.0
@@ -63,6 +65,9 @@ def connect(address: str | None) -> None:
 
 
 def _spread(ray, blocks: Sequence[Block]) -> Iterator[tuple[Block, list[dict]]]:
+    for module in {type(block.policy).__module__ for block in blocks}:
+        if module.startswith(OF_FILES):  # which workers cannot import
+            ray.cloudpickle.register_pickle_by_value(sys.modules[module])
     task = ray.remote(num_cpus=1, max_retries=-1, scheduling_strategy="SPREAD")(_measured)
     waiting, running = list(reversed(blocks)), {}
     while waiting or running:

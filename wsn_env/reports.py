@@ -135,8 +135,9 @@ def draw_front(evaluation: Evaluation, lam: float, emphasis: str | None = None):
     for policy in evaluation.policies:
         s = evaluation.summary(policy, lam)
         points[policy] = s["energy_mj"], s["error_m"]
-        _draw_point(axes, policy, *points[policy], strong=policy == emphasis)
-    for stem in {stem_of(policy) for policy in points} - set(points):
+        numbered = stem_of(policy) != policy and stem_of(policy) in evaluation.families()
+        _draw_point(axes, policy, *points[policy], strong=policy == emphasis, numbered=numbered)
+    for stem in evaluation.families():
         family = sorted(
             (points[policy][0].mean, points[policy][1].mean) for policy in points if stem_of(policy) == stem
         )
@@ -168,8 +169,7 @@ def draw_floor(axes, evaluation: Evaluation) -> None:
         axes.axhline(ROUND * floor, color=FLOOR, linewidth=1, linestyle=":", label=label)
 
 
-def _draw_point(axes, policy: str, energy, error, strong: bool) -> None:
-    numbered = stem_of(policy) != policy
+def _draw_point(axes, policy: str, energy, error, strong: bool, numbered: bool) -> None:
     colour = EMPHASIS if strong else FAMILY if numbered else OTHER
     axes.errorbar(
         energy.mean,

@@ -135,7 +135,7 @@ def _episode_sections(evaluation: Evaluation, policies: dict[str, Policy]) -> li
         _section(
             f"The worst episode of {first}",
             f"<p>Seed {seeds[worst]}, lam = {lam:g} m/mJ, return {returns[worst]:.1f} (mean {returns.mean():.1f})."
-            " Click into it for its keys.</p>",
+            " Click it, then space plays and arrows step.</p>",
             player(common(scenario, seeds[worst]), recorded),
         ),
     ]

@@ -287,7 +287,7 @@ for (const [hue, word] of words) {
   entry.append(dot, word);
   element("legend").append(entry);
 }
-element("legend").append("cross: estimate; ellipse: 95 %; " + (data.radius_m ? "shade: sensing range; " : "") + "grey: asleep, fading with its battery");
+element("legend").append("ring: has reported; cross: estimate; ellipse: 95 %; " + (data.radius_m ? "shade: sensing range; " : "") + "grey: asleep, fading with its battery");
 new ResizeObserver(draw).observe(document.body);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 seek(0);
