@@ -28,6 +28,7 @@ from wsn_env.progress import Progress
 from wsn_env.ray_engine import connect
 
 PERIODS = "periods.json"
+FIRST_S = 900.0  # a rollout may take so long: runners compile their kernels in the first
 
 
 class EntryModule(TorchRLModule, ValueFunctionAPI):
@@ -124,6 +125,7 @@ class RayTraining:
                 num_envs_per_env_runner=each,
                 gym_env_vectorize_mode="vector_entry_point",
                 rollout_fragment_length=rollout,
+                sample_timeout_s=FIRST_S,
             )
             .fault_tolerance(restart_failed_env_runners=True)
             .training(
@@ -158,7 +160,8 @@ class RayTraining:
             while self.periods < steps:
                 result = self._algorithm.train()
                 self.periods = int(result["num_env_steps_sampled_lifetime"])
-                reward = result["env_runners"].get("episode_return_mean", float("nan"))
+                # Without "env_runners": all of them were lost, or late; they sample in the next turn.
+                reward = result.get("env_runners", {}).get("episode_return_mean", float("nan"))
                 progress(min(self.periods, steps), steps, f"training, reward {reward:.1f}")
                 if self.periods - saved >= checkpoint_steps:
                     self._save()
