@@ -31,9 +31,9 @@ pretrained-%: $(READY)
 	cp out/pretrained/$*/policy.json out/pretrained/$*/policy.safetensors agents/pretrained/$*/
 
 test: $(READY)
-	$(RUN) -m pytest $(PARALLEL) $(if $(SLOW),-m "slow or not slow")
+	$(RUN) -m pytest $(PARALLEL) $(if $(SLOW),-m "not full")
 
-# The studies that `make test` leaves out, a few minutes; `make test SLOW=1` runs all.
+# The studies that `make test` leaves out, a few minutes; `make test SLOW=1` runs all but those with a short form.
 slow: $(READY)
 	$(RUN) -m pytest $(PARALLEL) -m slow
 

@@ -12,8 +12,8 @@ from wsn_env import Scenario
 from wsn_env.interface.merit import gain
 from wsn_env.physics.acoustics import absorption_db_per_km, ambient_noise_db
 from wsn_env.physics.constants import constants
+from wsn_env.physics.sensing import expected_strengths, linearised_strengths
 from wsn_env.sections import Sonar
-from wsn_env.trackers.kalman import EKFTracker
 
 ALPHA = 1.18703e-3  # dB/m at 10 kHz
 
@@ -79,14 +79,15 @@ def test_levels_weigh_like_plain_numpy(particles):
     np.testing.assert_allclose(filter.belief.n_eff[0], n_eff, rtol=1e-3)
 
 
-def test_the_slope_of_the_level_in_the_extended_filter():
-    tracker = EKFTracker(Scenario.named("PreDC-v0", measurement="sonar", frequency_khz=500.0, tracker="ekf"))
-    node, x, step = np.array([40.0, 50.0]), np.array([52.0, 0, 61.0, 0]), 1e-5
-    _, row = tracker._strength(x, node)
-    for axis in (0, 2):
-        shift = step * np.eye(4)[axis]
-        slope = (tracker._strength(x + shift, node)[0] - tracker._strength(x - shift, node)[0]) / (2 * step)
-        assert row[0, axis] == pytest.approx(slope[0], rel=1e-6)
+def test_the_slope_of_the_level():
+    measurement = Scenario.named("PreDC-v0", measurement="sonar", frequency_khz=500.0).measurement
+    nodes, point, step = np.array([[40.0, 50.0]]), np.array([52.0, 61.0]), 1e-5
+    levels, slopes = linearised_strengths(point, nodes, measurement)
+    assert levels == expected_strengths(point, nodes, measurement)
+    for axis in (0, 1):
+        shift = step * np.eye(2)[axis]
+        ends = (expected_strengths(point + way * shift, nodes, measurement) for way in (1, -1))
+        assert slopes[0, axis] == pytest.approx((next(ends) - next(ends))[0] / (2 * step), rel=1e-6)
 
 
 def test_information_gain_knows_the_slope():

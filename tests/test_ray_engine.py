@@ -53,7 +53,7 @@ def test_a_node_that_is_killed_costs_a_retry_and_not_a_row(cluster, tmp_path):
 @pytest.mark.slow
 def test_a_worker_that_is_killed_costs_a_retry(tmp_path):
     ray = pytest.importorskip("ray")
-    ray.init(num_cpus=2, log_to_driver=False)
+    ray.init("local", num_cpus=2, log_to_driver=False)
     try:
         marks = tmp_path / "killed"
         policies = {"suicidal": _Suicidal(SCENARIO, str(marks)), "pre_dc": make_policy("pre_dc", SCENARIO)}
@@ -74,7 +74,7 @@ def test_policies_of_a_file_travel_to_the_workers(tmp_path):
         "    def __init__(self, scenario):\n        self.other = make_policy('nearest2', scenario)\n"
         "    def act(self, view):\n        return self.other.act(view)\n"
     )
-    ray.init(num_cpus=1, log_to_driver=False)
+    ray.init("local", num_cpus=1, log_to_driver=False)
     try:
         own = f"mine={tmp_path}/mine.py:Mine"
         spread = evaluate([own, "nearest2"], SCENARIO, [4.0], 3, engine=on_ray())

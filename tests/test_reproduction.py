@@ -179,6 +179,7 @@ def test_a_file_in_the_way_is_named(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.full
 def test_the_whole_reproduction(tmp_path):
     reproduce("pre_dc", tmp_path, runs=100, progress=silent)
     missed = {r["quantity"] for r in read(tmp_path / "expected.csv") if r["within"] != "True"}

@@ -140,6 +140,7 @@ def test_every_row_is_there(short):
 
 
 @pytest.mark.slow
+@pytest.mark.full
 def test_the_whole_reproduction(tmp_path):
     reproduce("binary", tmp_path, runs=100, progress=silent)
     assert [row["quantity"] for row in read(tmp_path / "expected.csv") if row["within"] != "True"] == []

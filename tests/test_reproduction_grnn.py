@@ -115,6 +115,7 @@ def test_every_expected_figure_and_claim_is_listed(short):
 
 
 @pytest.mark.slow
+@pytest.mark.full
 def test_the_full_form(tmp_path):
     reproduce("grnn", tmp_path, runs=100, progress=lambda done, total, what: None)
     assert {row["quantity"] for row in read(tmp_path / "expected.csv") if row["within"] != "True"} == set()

@@ -128,6 +128,7 @@ def test_every_expected_figure_and_claim_is_listed(short):
 
 
 @pytest.mark.slow
+@pytest.mark.full
 def test_the_whole_reproduction(tmp_path):
     reproduce("underwater", tmp_path, runs=100, progress=silent)
     assert [row["quantity"] for row in read(tmp_path / "expected.csv") if row["within"] != "True"] == []

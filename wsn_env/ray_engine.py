@@ -59,7 +59,7 @@ def connect(address: str | None) -> None:
         except (OSError, ValueError) as problem:
             raise ValueError(f"engine 'ray': nobody answers at {address!r} ({problem}): {allowed}") from None
     try:
-        ray.init(address, log_to_driver=False, logging_level="error")
+        ray.init(address or "local", log_to_driver=False, logging_level="error")
     except ConnectionError as problem:
         raise ValueError(f"engine 'ray': no cluster at {address!r} ({problem}): {allowed}") from None
 
