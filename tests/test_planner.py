@@ -158,6 +158,7 @@ def test_the_comparison_tells_what_a_decision_costs(capsys):
 
 
 @pytest.mark.slow
+@pytest.mark.full
 def test_it_is_no_worse_than_the_best_fixed_cluster_in_hindsight():
     """30 episodes tell means apart to 6 %; over more it is well ahead (docs/learning.md)."""
     scenario = Scenario.named("Rssi-v0", lam=4.0)
