@@ -69,9 +69,9 @@ def measure(options: Options, console: Console) -> Result:
     return Result(
         name="frames",
         title="Frames",
-        text=f"A frame of {SIZE} x {SIZE} pixels of {scenario.name} in its period {PERIODS}:"
-        f" {scenario.field.nodes} nodes, {scenario.tracking.particles:,} particles, two tails. Pillow draws the main shapes only, without ranges,"
-        " ellipse and words.",
+        text=f"A frame of {SIZE} x {SIZE} pixels of {scenario.name} in its period {PERIODS}: "
+        f"{scenario.field.nodes} nodes, {scenario.tracking.particles:,} particles, two tails. "
+        "Pillow draws the main shapes only, without ranges, ellipse and words.",
         claims=[
             Claim("frames a second", AT_LEAST_FPS, 1 / times.median("wsn_env"), unit="fps"),
             Claim("the same over Pillow, smooth", 2.0, times.ratio("Pillow, smooth", "wsn_env")),
