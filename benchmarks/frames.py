@@ -13,7 +13,8 @@ from rich.console import Console
 from benchmarks.race import Claim, Options, Result, Table, figure, interleave, main
 from wsn_env import Scenario, View, World, draws, make_policy
 from wsn_env.rendering.camera import Camera
-from wsn_env.rendering.frame import BLUE, FULL, GREEN, INK, ORANGE, PAPER, SIZE, SKY, VERMILLION
+from wsn_env.rendering.palette import BLUE, FULL, GREEN, INK, ORANGE, PAPER, SKY, VERMILLION
+from wsn_env.rendering.plan import SIZE
 
 PERIODS = 60  # of the tails
 AT_LEAST_FPS = 500.0

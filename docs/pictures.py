@@ -15,20 +15,8 @@ from PIL import Image
 from wsn_env import Scenario, View, World, draws, make_policy
 from wsn_env.registration import IDS
 from wsn_env.rendering.camera import Camera
-from wsn_env.rendering.frame import (
-    BLUE,
-    FLASH,
-    FULL,
-    GREEN,
-    INK,
-    ORANGE,
-    PURPLE,
-    SENSED,
-    SIZE,
-    SKY,
-    VERMILLION,
-    YELLOW,
-)
+from wsn_env.rendering.palette import BLUE, FLASH, FULL, GREEN, INK, ORANGE, PURPLE, SENSED, SKY, VERMILLION, YELLOW
+from wsn_env.rendering.plan import SIZE
 
 SEED, PERIODS = 7, 25
 POLICIES = (  # where a policy is at home

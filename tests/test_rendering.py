@@ -13,7 +13,8 @@ from PIL import Image
 from wsn_env import ClusterEnv, ClusterVectorEnv
 from wsn_env.registration import IDS
 from wsn_env.rendering import camera
-from wsn_env.rendering.frame import BLUE, FLASH, GREEN, ORANGE, PURPLE, VERMILLION, WORDS_FROM
+from wsn_env.rendering.palette import BLUE, FLASH, GREEN, ORANGE, PURPLE, VERMILLION
+from wsn_env.rendering.plan import WORDS_FROM
 
 GOLDEN = Path(__file__).parent / "golden" / "frame.png"
 

@@ -9,7 +9,7 @@ import numpy as np
 from wsn_env import draws
 from wsn_env.evaluation import episodes
 from wsn_env.policies import Policy
-from wsn_env.rendering.frame import shows_radius
+from wsn_env.rendering.plan import shows_radius
 from wsn_env.scenario import Scenario
 from wsn_env.types import Outcome, State
 from wsn_env.world import World

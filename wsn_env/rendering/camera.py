@@ -8,7 +8,8 @@ from math import ceil
 import gymnasium as gym
 import numpy as np
 
-from wsn_env.rendering.frame import SIZE, SMALLEST, frame
+from wsn_env.rendering.frame import frame
+from wsn_env.rendering.plan import SIZE, SMALLEST
 from wsn_env.rendering.trail import Trail
 from wsn_env.scenario import Scenario
 from wsn_env.types import Outcome, State
