@@ -47,7 +47,7 @@ def write_report(
     Args:
         folder: of the run or the evaluation; a training's learning curve is read from its progress-*/progress.csv.
         evaluation: left out: the page has no comparison.
-        policies: those of the evaluation, by name, for its histograms and its worst episode. The first is what the
+        policies: with an evaluation its policies by name, for histograms and the worst episode. The first is what the
             others are compared with.
         training: settings of the training.
 
@@ -59,9 +59,7 @@ def write_report(
     if evaluation is not None:
         names = ", ".join(evaluation.policies[:3]) + (", ..." if len(evaluation.policies) > 3 else "")
         title = f"{evaluation.scenario.name}: {names}"
-        sections = [*_comparison_sections(evaluation), *sections]
-        if policies:
-            sections += _episode_sections(evaluation, policies)
+        sections = [*_comparison_sections(evaluation), *sections, *_episode_sections(evaluation, policies)]
     sections += _settings_sections(evaluation, training)
     with replacing(folder / REPORT_FILE) as path:
         path.write_text(whole_page("report", title, "\n".join(sections)), encoding="utf-8")
