@@ -428,10 +428,10 @@ def compare(settings: Training, scenario: Scenario, policies: dict[str, Policy],
         )
     evaluation.save(folder)
     save_markdown(evaluation, folder)
-    forget_blocks(folder)
     print_tables(evaluation, reference="ppo")
     write_picture(folder / "comparison.png", draw_front(evaluation, lams[len(lams) // 2], emphasis="ppo"))
     report = write_report(folder, evaluation, policies, made)
+    forget_blocks(folder)
     print(f"written: {folder / 'evaluation.csv'}, {folder / 'comparison.png'}, {report}")
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from tests.browser import chromium, complaints
-from wsn_env import Scenario, evaluate, make_policy
+from wsn_env import Scenario, World, evaluate, make_policy
 from wsn_env.bluetooth.synthetic import write_dataset
 from wsn_env.cli import main
-from wsn_env.evaluation import evaluation_seeds
+from wsn_env.evaluation import episodes, evaluation_seeds
 from wsn_env.pages.replay_page import replay
 from wsn_env.pages.report_page import read_progress
 from wsn_env.registration import IDS
@@ -46,8 +46,20 @@ def test_a_replay_tells_what_the_evaluation_does(name, tmp_path):
         assert sum(frame["energy"] for frame in frames[1:]) == pytest.approx(
             row["energy_mj"] * scenario.periods, rel=1e-3
         )
-        spent_uj = sum(spent for frame in frames[1:] for _, spent in frame["spent_uj"])
-        assert spent_uj / 1000 == pytest.approx(sum(frame["energy"] for frame in frames[1:]), rel=1e-2)
+
+
+@pytest.mark.parametrize("start", ["known", "search"])
+def test_batteries_are_the_worlds_to_the_last_node(start, tmp_path):
+    scenario = Scenario.named("PreDC-v0", battery_j=1e-4, particles=300, start=start)
+    policy = make_policy("all", scenario)
+    replay({"all": policy}, scenario, SEED, tmp_path / "replay.html")
+    left = np.full(scenario.field.nodes, scenario.radio.battery_j)
+    for frame in data_of(tmp_path / "replay.html")["episodes"][0]["frames"]:
+        for node, battery in frame["left_j"]:
+            left[node] = battery
+    *_, (state, _) = episodes(policy, World(scenario), [SEED])
+    np.testing.assert_allclose(left, state.network.battery[0], rtol=1e-6)
+    assert (left == 0).any()
 
 
 def test_a_recorded_track_is_replayed(tmp_path, capsys):

@@ -172,10 +172,10 @@ def run_evaluate(command: Evaluate) -> None:
     if command.out:
         evaluation.save(command.out)
         save_markdown(evaluation, command.out)
-        forget_blocks(command.out)
         names = ["evaluation.csv", "evaluation.json", "evaluation.md", *(FRONT_FILES if command.pareto else ())]
         if can_draw():
             names.append(write_report(command.out, evaluation, policies).name)
+        forget_blocks(command.out)
         print(f"written: {', '.join(str(command.out / name) for name in names)}")
 
 

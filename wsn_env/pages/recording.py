@@ -83,8 +83,7 @@ def _frame(state: State, outcome: Outcome | None, scenario: Scenario) -> dict:
     network, belief, reports = state.network, state.belief.row[0], state.reports
     x = state.belief.particles[0]
     shown = slice(0, None, max(1, -(-x.shape[1] // CLOUD)))
-    count = 0 if outcome is None else int(state.ledger.count[0])
-    payers = state.ledger.payer[0, :count]
+    payers = state.ledger.payer[0, : state.ledger.count[0]]
     frame = {
         "mean": _steps(belief["mean"][::2], whole),
         "cov": [float(f"{belief['cov'][i, j]:.3g}") for i, j in ((0, 0), (0, 2), (2, 2))],
@@ -92,7 +91,7 @@ def _frame(state: State, outcome: Outcome | None, scenario: Scenario) -> dict:
         "head": int(network.head[0]),
         "members": network.members[0, : network.n_members[0]].tolist(),
         "heard": reports.node[0, : reports.count[0]].tolist(),
-        "spent_uj": [[int(node), round(1e6 * state.ledger.spent_j[0, node], 1)] for node in payers],
+        "left_j": [[int(node), float(f"{network.battery[0, node]:.7g}")] for node in payers],
     }
     if outcome is not None:
         frame |= {

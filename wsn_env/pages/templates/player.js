@@ -27,7 +27,7 @@ function pairs(flat, unit) {
 for (const episode of episodes) {
   const left = new Float64Array(nodes.length).fill(data.battery_j);
   episode.left = episode.frames.map((frame) => {
-    for (const [node, spent] of frame.spent_uj) left[node] = Math.max(0, left[node] - 1e-6 * spent);
+    for (const [node, battery] of frame.left_j) left[node] = battery;
     return Float64Array.from(left);
   });
   episode.awake = episode.frames.map((frame) => new Set(frame.head < 0 ? frame.members : [frame.head, ...frame.members]));
