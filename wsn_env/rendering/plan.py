@@ -13,7 +13,7 @@ from wsn_env.rendering.palette import BLUE, DIM, EMPTY, FRAME, FULL, INK, ORANGE
 from wsn_env.scenario import Scenario
 
 SIZE, SMALLEST = 600, 64  # pixels
-WORDS_FROM = 240  # smaller frames have neither numbers nor legend
+WORDS_FROM = 280  # smaller frames have neither numbers nor legend
 SEEN = 1.5  # how many points a particle is
 
 
