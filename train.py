@@ -33,19 +33,22 @@ from agents.recipe import other_densities, suited_level, suited_order
 from agents.sb3 import SB3VecEnv
 from agents.training_reward import TrainingReward
 from wsn_env.cli import make_scenario
-from wsn_env.evaluation import FIRST_SEED, evaluate, evaluation_seeds, forget_blocks, versions
+from wsn_env.evaluation import evaluate
 from wsn_env.files import replacing
 from wsn_env.interface import Settings
 from wsn_env.interface.features import BELIEF_FEATURES, CANDIDATE_FEATURES
 from wsn_env.interface.prospects import ENTRY_FEATURES
+from wsn_env.kept_blocks import forget_blocks
 from wsn_env.pages.report_page import write_report
 from wsn_env.pictures import write_picture
 from wsn_env.policies import Policy, make_policy, policy_names
 from wsn_env.progress import progress_bar
 from wsn_env.quantity import check_quantity, parse_overrides
 from wsn_env.reports import draw_front, print_tables, save_markdown
+from wsn_env.rollout import FIRST_SEED, evaluation_seeds
 from wsn_env.scenario import Scenario
 from wsn_env.vector_env import ClusterVectorEnv
+from wsn_env.versions import versions
 
 SLOW = ("ppo", "planner")  # left out of the comparison: the one trained is in it, the other takes hours
 
@@ -429,10 +432,11 @@ def compare(settings: Training, scenario: Scenario, policies: dict[str, Policy],
     evaluation.save(folder)
     save_markdown(evaluation, folder)
     print_tables(evaluation, reference="ppo")
-    write_picture(folder / "comparison.png", draw_front(evaluation, lams[len(lams) // 2], emphasis="ppo"))
-    report = write_report(folder, evaluation, policies, made)
+    write_picture(folder / "comparison.png", draw_front(evaluation, evaluation.middle_lam, emphasis="ppo"))
+    with progress_bar() as report:
+        page = write_report(folder, evaluation, policies, made, report)
     forget_blocks(folder)
-    print(f"written: {folder / 'evaluation.csv'}, {folder / 'comparison.png'}, {report}")
+    print(f"written: {folder / 'evaluation.csv'}, {folder / 'comparison.png'}, {page}")
 
 
 if __name__ == "__main__":

@@ -16,12 +16,13 @@ import numpy as np
 from agents.base import ViewPolicy
 from agents.imagined import draw_worlds, imagined_world, place_nodes, rows_of
 from agents.nearest import Nearest
-from wsn_env.evaluation import evaluate, rollout
+from wsn_env.evaluation import evaluate
 from wsn_env.interface.actions import MENU_MEMBERS, MenuAction
 from wsn_env.interface.rewards import belief_cost
 from wsn_env.policies import Policy, make_policy
 from wsn_env.progress import progress_bar
 from wsn_env.quantity import check_quantity
+from wsn_env.rollout import rollout
 from wsn_env.scenario import Scenario
 from wsn_env.sections import Binary, Position
 from wsn_env.types import Cluster, State

@@ -18,10 +18,10 @@ from agents.adaptive import RULES, Adaptive, Switch
 from agents.greedy import Greedy, Terms
 from agents.nearest import ORDERS, Nearest
 from agents.tuned import TABLE
-from wsn_env.evaluation import BLOCK, evaluation_seeds, rollout
 from wsn_env.files import replacing
 from wsn_env.policies import Policy
 from wsn_env.progress import Progress, progress_bar
+from wsn_env.rollout import BLOCK, evaluation_seeds, rollout
 from wsn_env.scenario import Scenario
 from wsn_env.world import World
 

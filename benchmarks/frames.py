@@ -13,7 +13,7 @@ from rich.console import Console
 from benchmarks.race import Claim, Options, Result, Table, figure, interleave, main
 from wsn_env import Scenario, View, World, draws, make_policy
 from wsn_env.rendering.camera import Camera
-from wsn_env.rendering.palette import BLUE, FULL, GREEN, INK, ORANGE, PAPER, SKY, VERMILLION
+from wsn_env.rendering.palette import BLUE, FULL, GREEN, INK, ORANGE, PAPER, SKY, VERMILION
 from wsn_env.rendering.plan import SIZE
 
 PERIODS = 60  # of the tails
@@ -42,7 +42,7 @@ def by_pillow(state, scenario, estimates, enlarged: int) -> np.ndarray:
     for node in state.reports.node[0, : state.reports.count[0]]:
         draw.line(pixels(nodes[[node, head]]), fill=ORANGE, width=2 * enlarged)
     discs(nodes[members], 5 * enlarged, BLUE)
-    discs(nodes[[head]], 8 * enlarged, VERMILLION)
+    discs(nodes[[head]], 8 * enlarged, VERMILION)
     draw.line(pixels(state.track[0, : state.period[0] + 1, ::2]), fill=GREEN, width=2 * enlarged)
     draw.line(pixels(estimates), fill=INK, width=enlarged)
     return np.asarray(image if enlarged == 1 else image.reduce(enlarged))
@@ -92,7 +92,7 @@ def same_colours(calls) -> None:
     """Raise unless every painter has drawn awake nodes, head and track."""
     for name, call in calls.items():
         picture = call()
-        for colour in (BLUE, VERMILLION, GREEN):
+        for colour in (BLUE, VERMILION, GREEN):
             if not (picture == colour).all(axis=2).any():
                 raise SystemExit(f"{name} lacks the colour {colour}")
 

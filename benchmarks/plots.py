@@ -6,12 +6,10 @@ import math
 from pathlib import Path
 
 from benchmarks.race import Plot
+from wsn_env.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
 from wsn_env.files import replacing
 
-BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE = (
-    "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
-)  # fmt: skip
-OURS = {"wsn_env, strict": VERMILLION, "wsn_env, fast": ORANGE}
+OURS = {"wsn_env, strict": VERMILION, "wsn_env, fast": ORANGE}
 COLOURS = (BLUE, GREEN, PURPLE, SKY, BLACK)  # of the others, with another dash in every turn; yellow is too pale
 OUR_ENVIRONMENT = "vector environment"  # how its lines begin
 DASHES = ("-", "--", ":")
@@ -34,7 +32,7 @@ def draw(plot: Plot, path: Path) -> None:
             turn = others.index(name) if name in others else 0
             colours[name] = OURS.get(name) or COLOURS[turn % len(COLOURS)]
             if name.startswith(OUR_ENVIRONMENT):
-                colours[name] = VERMILLION
+                colours[name] = VERMILION
             dash = "-" if name in OURS else DASHES[turn // len(COLOURS) % len(DASHES)]
             width = 2.5 if name in OURS else 1.4
             axes.loglog(*zip(*line), dash, color=colours[name], linewidth=width, marker="o", markersize=width + 1.5)

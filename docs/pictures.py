@@ -15,7 +15,7 @@ from PIL import Image
 from wsn_env import Scenario, View, World, draws, make_policy
 from wsn_env.registration import IDS
 from wsn_env.rendering.camera import Camera
-from wsn_env.rendering.palette import BLUE, FLASH, FULL, GREEN, INK, ORANGE, PURPLE, SENSED, SKY, VERMILLION, YELLOW
+from wsn_env.rendering.palette import BLUE, FLASH, FULL, GREEN, INK, ORANGE, PURPLE, SENSED, SKY, VERMILION, YELLOW
 from wsn_env.rendering.plan import SIZE
 
 SEED, PERIODS = 7, 25
@@ -58,7 +58,7 @@ def film(path: Path, policies: Sequence[str] = ("pre_dc", "ppo"), seed: int = 3,
 
 def palette() -> list[int]:
     """The colours of frames, each in steps towards white, so that none is lost to those that cover more."""
-    inks = (INK, BLUE, VERMILLION, ORANGE, GREEN, SKY, PURPLE)
+    inks = (INK, BLUE, VERMILION, ORANGE, GREEN, SKY, PURPLE)
     steps = np.linspace(0, 1, 8)[:, None, None]
     blended = np.array(inks) * (1 - steps) + 255 * steps
     return [*blended.reshape(-1).astype(int).tolist(), *np.ravel([FULL, FLASH, YELLOW, *SENSED]).tolist()]

@@ -18,11 +18,18 @@ import tyro
 from train import Training, train
 from wsn_env.bluetooth.calibration import leave_one_out
 from wsn_env.bluetooth.dataset import read_dataset
-from wsn_env.evaluation import episodes
+from wsn_env.colours import BLUE, DARK, SKY, VERMILION
 from wsn_env.files import replacing
 from wsn_env.policies import make_policy
 from wsn_env.progress import progress_bar
-from wsn_env.recorded_evaluation import FILES, RecordedEvaluation, evaluate_recorded, print_recorded, save_recorded
+from wsn_env.recorded_evaluation import (
+    RecordedEvaluation,
+    evaluate_recorded,
+    forget_recorded_blocks,
+    print_recorded,
+    save_recorded,
+)
+from wsn_env.rollout import episodes
 from wsn_env.scenario import Scenario
 from wsn_env.world import World
 
@@ -80,10 +87,11 @@ def main() -> int:
             keep=asked.out,
             progress=report,
         )
-    save_recorded(evaluation, asked.out)
+    names = save_recorded(evaluation, asked.out)
+    forget_recorded_blocks(evaluation, asked.out)
     print_recorded(evaluation)
     draw_replay(evaluation, asked, asked.out / "replay.png")
-    print(f"written: {', '.join(str(asked.out / name) for name in (*FILES, 'replay.png'))}")
+    print(f"written: {', '.join(str(asked.out / name) for name in (*names, 'replay.png'))}")
     return 0
 
 
@@ -123,20 +131,20 @@ def draw_replay(evaluation: RecordedEvaluation, asked: Study, path: Path) -> Non
     figure, axes = plt.subplot_mosaic([["room", "error"], ["room", "load"]], figsize=(11, 5.6), layout="constrained")
     room, error, load = axes["room"], axes["error"], axes["load"]
     width, depth = scenario.field.room_m
-    room.add_patch(plt.Rectangle((0, 0), width, depth, fill=False, color="#333333"))
+    room.add_patch(plt.Rectangle((0, 0), width, depth, fill=False, color=DARK))
     places = np.array(scenario.field.positions)
     area = 30 + 500 * listened / len(seen)
-    room.scatter(*places.T, s=area, color="#56B4E9", label="receiver; area: how often it listened")
-    room.plot(*seen[:, :2].T, color="#333333", linewidth=2.5, label="recorded way")
-    room.plot(*seen[:, 2:].T, color="#D55E00", linewidth=1.2, marker=".", markersize=4, label="estimate")
+    room.scatter(*places.T, s=area, color=SKY, label="receiver; area: how often it listened")
+    room.plot(*seen[:, :2].T, color=DARK, linewidth=2.5, label="recorded way")
+    room.plot(*seen[:, 2:].T, color=VERMILION, linewidth=1.2, marker=".", markersize=4, label="estimate")
     room.set(aspect="equal", xlabel="x [m]", ylabel="y [m]", title=f"{name}, lam = {scenario.lam:g} m/mJ")
     room.set_ylim(-4.5, depth + 1)
     room.legend(loc="lower center", frameon=False, ncols=2, fontsize=9, markerscale=0.4)
-    error.plot(time, errors, color="#D55E00", label="error")
-    error.plot(time, sds, color="#0072B2", linewidth=1, linestyle="--", label="what the belief expects")
+    error.plot(time, errors, color=VERMILION, label="error")
+    error.plot(time, sds, color=BLUE, linewidth=1, linestyle="--", label="what the belief expects")
     error.set(ylabel="m", ylim=(0, None))
     error.legend(frameon=False, fontsize=9)
-    load.step(time, awake, where="mid", color="#333333")
+    load.step(time, awake, where="mid", color=DARK)
     load.set(xlabel="time [s]", ylabel="listening receivers", ylim=(0, len(places)))
     for chart in (error, load):
         chart.grid(alpha=0.3)

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from scipy import stats
 
+from wsn_env.colours import LINES
 from wsn_env.files import replacing
-from wsn_env.front_report import COLOURS
 
 CURVE = "time/total_timesteps", "rollout/ep_rew_mean", "rollout/ep_len_mean"
 WORSE = 1.35  # the picture's lowest reward over its highest
@@ -90,7 +90,7 @@ def draw_curves(folders: Mapping[str, list[Path]], title: str, path: Path) -> No
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(figsize=(9, 5.5), layout="constrained")
-    for (name, runs), colour, line in zip(folders.items(), cycle(COLOURS), cycle(["-"] * len(COLOURS) + ["--"] * 7)):
+    for (name, runs), colour, line in zip(folders.items(), cycle(LINES), cycle(["-"] * len(LINES) + ["--"] * 7)):
         curves = [learning_curve(folder) for folder in runs]
         periods = curves[0][0]
         rewards = np.array([np.interp(periods, *curve) for curve in curves])

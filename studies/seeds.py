@@ -17,10 +17,11 @@ import tyro
 
 from agents.ppo import PPOPolicy
 from wsn_env.cli import make_scenario
-from wsn_env.evaluation import Evaluation, evaluate, forget_blocks
+from wsn_env.evaluation import Evaluation, evaluate
 from wsn_env.files import replacing
 from wsn_env.front import hypervolumes, joined, numbered, points_of, reference_point
 from wsn_env.intervals import Summary
+from wsn_env.kept_blocks import forget_blocks
 from wsn_env.policies import make_policy, policy_names
 from wsn_env.progress import progress_bar
 from wsn_env.scenario import Scenario

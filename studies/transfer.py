@@ -16,8 +16,9 @@ import tyro
 
 from studies.seeds import ahead_of, best_of, load, returns
 from wsn_env.cli import make_scenario
-from wsn_env.evaluation import Evaluation, evaluate, forget_blocks
+from wsn_env.evaluation import Evaluation, evaluate
 from wsn_env.files import replacing
+from wsn_env.kept_blocks import forget_blocks
 from wsn_env.policies import make_policy
 from wsn_env.progress import progress_bar
 from wsn_env.scenario import Scenario

@@ -11,10 +11,11 @@ from tests.test_env import same
 from tests.worlds import choices, keys_of
 from wsn_env import ClusterEnv, ClusterVectorEnv, Scenario, World, bounds, make_policy
 from wsn_env.bounds import Bound, bound_kind
-from wsn_env.evaluation import episodes, evaluate, evaluation_seeds, rollout
+from wsn_env.evaluation import evaluate
 from wsn_env.intervals import Summary
 from wsn_env.pictures import write_picture
 from wsn_env.reports import draw_front, markdown_table, print_tables
+from wsn_env.rollout import episodes, evaluation_seeds, rollout
 
 PLAIN = dict(particles=50)
 
@@ -24,7 +25,7 @@ def played(scenario, rows=5, seed=3, policy="random", threads=1):
     bound, told, states = Bound(scenario, rows, threads), [], []
     world = World(scenario, threads=1)
     for state, outcome in episodes(
-        make_policy(policy, scenario), world, range(seed, seed + rows), lambda s: told.append(bound.begin(s))
+        make_policy(policy, scenario), world, range(seed, seed + rows), lambda s, _: told.append(bound.begin(s))
     ):
         told.append(bound.advance(state, outcome))
         states.append((state.copy(), outcome))

@@ -14,6 +14,8 @@ FLOORS = {
     "wsn_env.progress": 0,
     "wsn_env.files": 0,
     "wsn_env.pictures": 0,
+    "wsn_env.colours": 0,
+    "wsn_env.versions": 0,
     "wsn_env.intervals": 0,
     "wsn_env.quantity": 0,
     "wsn_env.sections": 1,
@@ -38,6 +40,8 @@ FLOORS = {
     "agents.planner": 7,  # it rehearses and compares
     "agents.rllib": 7,  # joins a cluster
     "agents.sb3": 7,  # adapts the vector environment
+    "wsn_env.rollout": 6,
+    "wsn_env.kept_blocks": 6,
     "wsn_env.evaluation": 7,
     "wsn_env.scoring": 7,
     "wsn_env.pages": 8,

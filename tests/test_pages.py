@@ -1,6 +1,8 @@
 """Pages: their numbers are the evaluation's, and they work in a browser from a file, without network."""
 
+import base64
 import csv
+import html
 import json
 import re
 
@@ -11,10 +13,10 @@ from tests.browser import chromium, complaints
 from wsn_env import Scenario, World, evaluate, make_policy
 from wsn_env.bluetooth.synthetic import write_dataset
 from wsn_env.cli import main
-from wsn_env.evaluation import episodes, evaluation_seeds
+from wsn_env.pages.learning import read_progress
 from wsn_env.pages.replay_page import replay
-from wsn_env.pages.report_page import read_progress
 from wsn_env.registration import IDS
+from wsn_env.rollout import episodes, evaluation_seeds
 
 SEED = evaluation_seeds(0, 3)[2]
 TWO = {"Binary-v0": ("boundary", "nearest2"), "Underwater-v0": ("strongest_signal", "nearest2")}
@@ -43,7 +45,7 @@ def test_a_replay_tells_what_the_evaluation_does(name, tmp_path):
         assert len(frames) == scenario.periods + 1
         errors = np.array([frame["error"] for frame in frames[1 + scenario.unscored :]])
         assert np.sqrt(np.mean(errors**2)) == pytest.approx(row["rms_m"], rel=1e-3)
-        assert sum(frame["energy"] for frame in frames[1:]) == pytest.approx(
+        assert frames[0]["energy"] == 0 and sum(frame["energy"] for frame in frames) == pytest.approx(
             row["energy_mj"] * scenario.periods, rel=1e-3
         )
 
@@ -60,6 +62,29 @@ def test_batteries_are_the_worlds_to_the_last_node(start, tmp_path):
     *_, (state, _) = episodes(policy, World(scenario), [SEED])
     np.testing.assert_allclose(left, state.network.battery[0], rtol=1e-6)
     assert (left == 0).any()
+
+
+def test_what_a_search_costs_and_wakes_is_shown(tmp_path):
+    """Also before the first period, where it counts for nobody's return."""
+    scenario = Scenario.named("PreDC-v0", start="search", search_miss=0.5, particles=300)
+    out = tmp_path / "replay.html"
+    recording = replay({"nearest0": make_policy("nearest0", scenario)}, scenario, 0, out)
+    frames = data_of(out)["episodes"][0]["frames"]
+    searches = [frame for frame in frames if frame["search"]]
+    assert frames[0]["search"] and len(searches) > 1
+    assert all(frame["awake"] == scenario.field.nodes > len(frame["members"]) + 1 for frame in searches)
+    spent = [frame["energy"] for frame in frames]
+    assert spent[0] > 1 and np.mean(spent[1:]) == pytest.approx(recording.episodes[0].energy_mj, rel=1e-3)
+
+
+def test_binary_sensors_that_report_nothing_there_have_no_ring(tmp_path):
+    scenario = Scenario.named("Binary-v0", periods=20)
+    replay({"boundary": make_policy("boundary", scenario)}, scenario, 0, tmp_path / "replay.html")
+    data = data_of(tmp_path / "replay.html")
+    frames = data["episodes"][0]["frames"]
+    assert all(set(frame["detects"]) <= {*frame["heard"], *frame["members"], frame["head"]} for frame in frames)
+    assert any(set(frame["heard"]) - set(frame["detects"]) for frame in frames)
+    assert ["heard", "detects"] in data["legend"]
 
 
 def test_a_recorded_track_is_replayed(tmp_path, capsys):
@@ -116,6 +141,15 @@ def test_a_report_has_the_tables_and_the_worst_episode(reported):
     assert "numpy" in text and f"{rows[0]['seed']} to {rows[-1]['seed']}" in text
 
 
+def test_labels_are_no_formulas(tmp_path):
+    labels = [r"$\frac{$", "_top", "a$b$"]
+    named = [f"{label}=nearest{n}" for n, label in enumerate(labels)]
+    assert main(["evaluate", "--policies", *named, "--episodes", "2", "--lam", "1", "2", "--out", str(tmp_path)]) == 0
+    pictures = re.findall(r'src="data:image/svg\+xml;base64,(.*?)"', (tmp_path / "report.html").read_text())
+    drawn = [html.unescape(base64.b64decode(picture).decode()) for picture in pictures]
+    assert len(drawn) == 3 and all(f"{label}<" in picture for label in labels for picture in drawn)
+
+
 def test_without_matplotlib_there_is_no_report_but_all_else(tmp_path, monkeypatch):
     monkeypatch.setattr("wsn_env.pictures.find_spec", lambda name: None)
     assert main(["evaluate", "--policies", "nearest1", "--episodes", "2", "--out", str(tmp_path)]) == 0
@@ -123,17 +157,18 @@ def test_without_matplotlib_there_is_no_report_but_all_else(tmp_path, monkeypatc
 
 
 def test_a_training_is_read_in_the_order_of_its_steps(tmp_path):
-    """A run that was killed in the middle of a line, and resumed."""
+    """A run that was killed in the middle of a line, twice, and resumed from its last checkpoints."""
     for begins, text in {
-        0: "a,time/total_timesteps\n1.5,100\n,200\n2.",
-        200: "time/total_timesteps,b\n300,7\n",
+        0: "a,time/total_timesteps\n1.5,100\n,200\n9,300\n9,400\n2.",
+        200: "time/total_timesteps,b\n300,7\n1000,9\n11",
+        1000: "time/total_timesteps,b\n1100,8\n",
     }.items():
         (tmp_path / f"progress-{begins}").mkdir()
         (tmp_path / f"progress-{begins}" / "progress.csv").write_text(text)
     progress = read_progress(tmp_path)
-    assert np.array_equal(progress["time/total_timesteps"], [100, 200, 300])
-    assert np.array_equal(progress["a"], [1.5, np.nan, np.nan], equal_nan=True)
-    assert np.array_equal(progress["b"], [np.nan, np.nan, 7], equal_nan=True)
+    assert np.array_equal(progress["time/total_timesteps"], [100, 200, 300, 1000, 1100])
+    assert np.array_equal(progress["a"], [1.5, *[np.nan] * 4], equal_nan=True)
+    assert np.array_equal(progress["b"], [np.nan, np.nan, 7, 9, 8], equal_nan=True)
 
 
 @pytest.fixture(scope="module")
@@ -218,6 +253,28 @@ def test_hovering_shows_a_node(opened):
     assert tip.is_displayed() and "battery" in tip.text and "last in 30" in tip.text
     ActionChains(browser).move_to_element(browser.find_element("id", "play")).perform()
     assert not tip.is_displayed()
+
+
+def test_a_search_wakes_every_node_that_one_hovers_over(browser, tmp_path):
+    scenario = Scenario.named("PreDC-v0", start="search", search_miss=0.5, particles=300)
+    out = tmp_path / "replay.html"
+    replay({"nearest0": make_policy("nearest0", scenario)}, scenario, 0, out)
+    frames = data_of(out)["episodes"][0]["frames"]
+    k = next(k for k, frame in enumerate(frames) if k and frame["search"])
+    asleep = next(n for n in range(scenario.field.nodes) if all(n not in (f["head"], *f["members"]) for f in frames))
+    browser.get(out.as_uri())
+    caption = browser.find_element("css selector", "figcaption")
+    assert "225 awake" in caption.text and "search" in caption.text
+    browser.execute_script("seek(arguments[0])", k)
+    browser.execute_script(
+        "const [x, y] = scaleOf(views[0].canvas.getBoundingClientRect().width)(nodes[arguments[0]]);"
+        "const box = views[0].canvas.getBoundingClientRect();"
+        "hover(views[0], { clientX: box.left + x, clientY: box.top + y })",
+        asleep,
+    )
+    tip = browser.find_element("id", "tip").text
+    assert tip.startswith(f"node {asleep} ") and f"awake in 1 of {k} periods, last in {k}" in tip
+    assert complaints(browser) == []
 
 
 def test_what_is_drawn_moves_with_time(opened):

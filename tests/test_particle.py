@@ -7,10 +7,10 @@ import pytest
 from tests.worlds import leaves
 from wsn_env import Scenario, World, make_policy
 from wsn_env.compiling import fast
-from wsn_env.evaluation import episodes
 from wsn_env.physics.constants import constants
 from wsn_env.physics.motion import predict_moments
 from wsn_env.physics.sensing import detection_probability
+from wsn_env.rollout import episodes
 from wsn_env.trackers import kernels, likelihood
 from wsn_env.trackers.particle import ParticleTracker
 from wsn_env.types import State

@@ -15,7 +15,7 @@ from agents.pre_dc import PreDC
 from agents.strongest_signal import StrongestSignal
 from wsn_env import Scenario, View, World, draws, evaluate, make_policy
 from wsn_env.cli import main
-from wsn_env.evaluation import BLOCKS_FILE
+from wsn_env.kept_blocks import BLOCKS_FILE
 from wsn_env.physics.sensing import detection_probability
 from wsn_env.policies import policy_names
 from wsn_env.types import Cluster

@@ -9,8 +9,8 @@ import pytest
 from agents.ppo import PPOPolicy
 from wsn_env import Scenario, evaluate, make_policy
 from wsn_env.cli import main
-from wsn_env.evaluation import BLOCK
 from wsn_env.ray_engine import on_ray
+from wsn_env.rollout import BLOCK
 
 SCENARIO = Scenario.named("PreDC-v0", particles=50, nodes=40, side_m=50.0, crossing_m=20.0, periods=10)
 ROOT = os.path.dirname(os.path.dirname(__file__))

@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 
 import gymnasium as gym
 import numpy as np
@@ -14,7 +15,7 @@ from wsn_env.bluetooth.dataset import read_dataset, track_files
 from wsn_env.bluetooth.synthetic import write_dataset
 from wsn_env.cli import main
 from wsn_env.quantity import ScenarioError
-from wsn_env.recorded_evaluation import FILES, evaluate_recorded
+from wsn_env.recorded_evaluation import evaluate_recorded
 
 BLE = Scenario.named("Ble-v0", particles=200)
 
@@ -99,12 +100,18 @@ def test_a_recording_that_changes_is_read_again(folder, tmp_path):
     assert BLE.override(motion="replay", recording=str(path)).periods < whole
 
 
+def settings_of(out):
+    """By track."""
+    return json.loads((out / "tracks.json").read_text())["tracks"]
+
+
 def test_the_command_compares_on_every_track(folder, tmp_path, capsys):
     out = tmp_path / "out"
     policies = ["all", "informed2", "informed5", "quadrants:n=2"]
     arguments = ["evaluate", "--scenario", "Ble-v0", "--tracks", str(folder), "--episodes", "4", "--out", str(out)]
     assert main([*arguments, "--set", "particles=200", "--policies", *policies]) == 0
-    assert sorted(path.name for path in out.iterdir()) == sorted(FILES)
+    written = ["report.html", "tracks.csv", "tracks.json", "tracks.md", "tracks.png"]
+    assert sorted(path.name for path in out.iterdir()) == written
     with open(out / "tracks.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 3 * 4 * 4
@@ -112,9 +119,19 @@ def test_the_command_compares_on_every_track(folder, tmp_path, capsys):
     energy = {row["policy"]: float(row["energy_mj"]) for row in rows}
     assert energy["all"] == pytest.approx(12 * 16.2, rel=1e-3)
     assert energy["informed2"] == pytest.approx(3 * 16.2, rel=1e-3)
+    text = (out / "report.html").read_text()
+    for line in (out / "tracks.md").read_text().splitlines():
+        if line.startswith("| ") and "policy" not in line:
+            assert all(f">{cell.strip()}</td>" in text for cell in line.strip("|").split("|"))
+    played = json.loads(re.search(r'id="data">(.*?)</script>', text)[1])["episodes"][0]
+    of_first = [row for row in rows if row["policy"] == "all"]
+    rms = {name: sum(float(row["rms_m"]) for row in of_first if row["track"] == name) for name in settings_of(out)}
+    hardest = [row for row in of_first if row["track"] == max(rms, key=rms.get)]
+    assert played["policy"] == "all"
+    assert played["total"] == pytest.approx(min(float(row["return"]) for row in hardest))
     text = (out / "tracks.md").read_text()
     assert "quadrants:n=2" in text and "informed at that energy, interpolated" in text
-    settings = json.loads((out / "tracks.json").read_text())["tracks"]
+    settings = settings_of(out)
     assert len(settings) == 3
     # Calibrated without the track that is replayed.
     for name, each in settings.items():
@@ -191,7 +208,7 @@ def test_the_published_tracks_give_the_figures_of_the_study():
 def simulate(policy):
     """RMS of a policy over 200 simulated walks."""
     from wsn_env import make_policy
-    from wsn_env.evaluation import rollout
+    from wsn_env.rollout import rollout
 
     scenario = Scenario.named("Ble-v0")
     rows = rollout(make_policy(policy, scenario), World(scenario), list(range(200)))

@@ -13,8 +13,8 @@ from PIL import Image
 from wsn_env import ClusterEnv, ClusterVectorEnv
 from wsn_env.registration import IDS
 from wsn_env.rendering import camera
-from wsn_env.rendering.palette import BLUE, FLASH, GREEN, ORANGE, PURPLE, VERMILLION
-from wsn_env.rendering.plan import WORDS_FROM
+from wsn_env.rendering.palette import BLUE, FLASH, GREEN, ORANGE, PURPLE, VERMILION, YELLOW
+from wsn_env.rendering.plan import WORDS_FROM, legend, plan_of
 
 GOLDEN = Path(__file__).parent / "golden" / "frame.png"
 
@@ -49,23 +49,40 @@ def test_frame_is_the_golden_one():
     assert off.mean() < 0.5 and (off > 40).mean() < 0.001
 
 
-@pytest.mark.parametrize("scenario", IDS)
-def test_frames_show_target_and_awake_nodes_in_every_size(scenario):
-    for size in (64, 300, 600):
-        env, _ = played([13, 13], seed=1, scenario=scenario, frame_px=size)
-        picture = env.render()
-        assert picture.shape == (size, size, 3) and picture.dtype == np.uint8
-        if size >= WORDS_FROM:
-            assert count(field_of(picture), GREEN) > 0 and count(field_of(picture), BLUE) > 0
+def off(picture, points, colour):
+    """How far the pixels at (N, 2) are from a colour."""
+    x, y = np.floor(points).astype(int).T
+    return np.abs(picture[y, x].astype(int) - colour).max(axis=1)
+
+
+@pytest.mark.parametrize("name", IDS)
+@pytest.mark.parametrize("size", [64, 300, 600])
+def test_frames_show_target_head_and_awake_nodes_where_they_are(name, size):
+    env, _ = played([13, 13], seed=1, scenario=name, frame_px=size)
+    picture, view, scenario = env.render(), env.view, env.scenario
+    assert picture.shape == (size, size, 3) and picture.dtype == np.uint8
+    plan = plan_of(size, name, scenario.field.room_m, legend(scenario))
+    # A ring about the target, of which the estimate covers a part; the tail ends in its middle.
+    turns = np.linspace(0, 2 * np.pi, 16, endpoint=False)
+    radius = max(6 * plan.unit, 3.2) - max(2.6 * plan.unit, 1.4) / 2
+    ring = plan.pixels(env.unwrapped._state.track[0, 2, ::2]) + radius * np.column_stack([np.cos(turns), np.sin(turns)])
+    assert (off(picture, ring, GREEN) < 100).mean() > 0.4
+    if size < WORDS_FROM:
+        return
+    awake, head = view.member[0].copy(), view.head[0]
+    if scenario.radio.receiver == "head":
+        awake[head] = False
+        assert (off(picture, plan.pixels(view.positions[0, [head]]), VERMILION) == 0).all()
+    assert awake.any() and (off(picture, plan.pixels(view.positions[0, awake]), BLUE) == 0).all()
 
 
 def test_frame_shows_head_reports_and_handover():
     env, info = played([13, 25])
     picture = field_of(env.render())
-    assert count(picture, VERMILLION) > 100 and (count(picture, PURPLE) > 0) == info["handover"]
+    assert count(picture, VERMILION) > 100 and (count(picture, PURPLE) > 0) == info["handover"]
     assert (count(picture, ORANGE) > 0) == (info["detections"] > 0)
     env.reset(seed=0)
-    assert not count(field_of(env.render()), VERMILLION)
+    assert not count(field_of(env.render()), VERMILION)
 
 
 def test_a_search_flashes():
@@ -144,6 +161,29 @@ def test_window_shows_every_period_and_closes(no_screen):
     rows.reset(seed=0)
     assert pygame.display.get_surface().get_size() == (304, 202)
     rows.close()
+
+
+def test_environments_share_the_screens_one_window(no_screen):
+    pygame = no_screen
+    first, second = (ClusterEnv(render_mode="human", frame_px=size) for size in (64, 80))
+    for env in (first, second, first):
+        env.reset(seed=0)
+        size = pygame.display.get_surface().get_size()[0]
+        assert size == env._camera.frame_px
+    first.close()
+    second.step(13)
+    assert pygame.display.get_surface().get_size() == (80, 80)
+    second.close()
+    assert pygame.display.get_surface() is None
+
+
+def test_words_that_do_not_fit_are_left_out_or_shorter():
+    """A search in a small frame: above the field stands the period alone."""
+    for size, chip in ((64, False), (300, True)):
+        env = ClusterEnv(render_mode="rgb_array", start="search", frame_px=size)
+        env.reset(seed=0)
+        above = env.render()[: size // 20]
+        assert (count(above, YELLOW) > 0) == chip
 
 
 def test_who_closes_the_window_is_not_shown_another(no_screen):

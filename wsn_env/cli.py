@@ -135,11 +135,13 @@ def place_of(problem: Exception) -> str:
 
 def run_evaluate(command: Evaluate) -> None:
     """`wsn evaluate`."""
-    from wsn_env.evaluation import evaluate, forget_blocks, named_policies
+    from wsn_env.evaluation import evaluate
     from wsn_env.front import check_front_libraries, lam_sweep
     from wsn_env.front_report import FRONT_FILES, report_front
+    from wsn_env.kept_blocks import forget_blocks
     from wsn_env.pages.report_page import write_report
     from wsn_env.pictures import can_draw
+    from wsn_env.policies import named_policies
     from wsn_env.ray_engine import on_ray
     from wsn_env.reports import print_tables, save_markdown
 
@@ -174,7 +176,8 @@ def run_evaluate(command: Evaluate) -> None:
         save_markdown(evaluation, command.out)
         names = ["evaluation.csv", "evaluation.json", "evaluation.md", *(FRONT_FILES if command.pareto else ())]
         if can_draw():
-            names.append(write_report(command.out, evaluation, policies).name)
+            with progress_bar() as report:
+                names.append(write_report(command.out, evaluation, policies, progress=report).name)
         forget_blocks(command.out)
         print(f"written: {', '.join(str(command.out / name) for name in names)}")
 
@@ -182,6 +185,8 @@ def run_evaluate(command: Evaluate) -> None:
 def run_evaluate_recorded(command: Evaluate) -> None:
     """`wsn evaluate --scenario Ble-v0 --tracks FOLDER`."""
     from wsn_env import recorded_evaluation
+    from wsn_env.pages.recorded_report import write_recorded_report
+    from wsn_env.pictures import can_draw
     from wsn_env.ray_engine import on_ray
 
     if command.pareto or len(command.tracks) != 1:
@@ -201,14 +206,18 @@ def run_evaluate_recorded(command: Evaluate) -> None:
         )
     recorded_evaluation.print_recorded(evaluation)
     if command.out:
-        recorded_evaluation.save_recorded(evaluation, command.out)
-        print(f"written: {', '.join(str(command.out / name) for name in recorded_evaluation.FILES)}")
+        names = recorded_evaluation.save_recorded(evaluation, command.out)
+        if can_draw():
+            with progress_bar() as report:
+                names.append(write_recorded_report(command.out, evaluation, command.policies, report).name)
+        recorded_evaluation.forget_recorded_blocks(evaluation, command.out)
+        print(f"written: {', '.join(str(command.out / name) for name in names)}")
 
 
 def run_replay(command: Replay) -> None:
     """`wsn replay`."""
-    from wsn_env.evaluation import named_policies
     from wsn_env.pages.replay_page import replay
+    from wsn_env.policies import named_policies
     from wsn_env.recorded_evaluation import replay_scenario
 
     given = {} if command.lam is None else {"lam": command.lam}
@@ -216,8 +225,8 @@ def run_replay(command: Replay) -> None:
     if command.recording:
         calibrated = any(pair.startswith("calibration=") for pair in command.set)
         scenario = replay_scenario(scenario, command.recording, calibrated)
-    recorded = replay(named_policies(command.policy, scenario), scenario, command.seed, command.out)
-    for episode in recorded:
+    recording = replay(named_policies(command.policy, scenario), scenario, command.seed, command.out)
+    for episode in recording.episodes:
         print(f"{episode.policy}: RMS {episode.rms_m:.3f} m, {episode.energy_mj:.4g} mJ a period")
     print(f"written: {command.out} ({command.out.stat().st_size / 1000:.0f} kB)")
 
@@ -239,8 +248,8 @@ def run_reproduce(command: Reproduce) -> None:
 def run_compile(command: Compile) -> None:
     """`wsn compile`: play a little of everything."""
     from wsn_env.env import ClusterEnv
-    from wsn_env.evaluation import episodes, rollout
     from wsn_env.policies import make_policy
+    from wsn_env.rollout import episodes, rollout
     from wsn_env.view import View
     from wsn_env.world import World
 

@@ -21,10 +21,11 @@ from pathlib import Path
 
 import numpy as np
 
-from wsn_env.evaluation import Evaluation, stem_of, versions
+from wsn_env.evaluation import Evaluation, stem_of
 from wsn_env.files import replacing
 from wsn_env.intervals import RESAMPLES, Summary
 from wsn_env.scenario import Scenario
+from wsn_env.versions import versions
 
 OTHERS = "all others together"
 COLUMNS = "front policy lam error_m error_low error_high energy_mj energy_low energy_high".split()

@@ -7,6 +7,7 @@ from math import floor, log10
 from pathlib import Path
 from textwrap import fill
 
+from wsn_env.colours import GREY, LINES
 from wsn_env.evaluation import Evaluation
 from wsn_env.front import (
     Fronts,
@@ -19,15 +20,12 @@ from wsn_env.front import (
     reference_point,
     save_front,
 )
-from wsn_env.pictures import write_picture
+from wsn_env.pictures import plain, write_picture
 from wsn_env.reports import draw_floor, interval_text, wide_console
 
 FRONT_FILES = ("front.csv", "front.json", "front.png")
 
-# Okabe and Ito's colours, which colour-blind readers tell apart, and shapes for where they run out or into each other.
-COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-MARKERS = "osD^vP*X<>p"
-BOX = "#777777"
+MARKERS = "osD^vP*X<>p"  # for where colours run out or into each other
 MARGIN = 1.2  # of the picture beyond the reference point and the best figures, as a factor
 NARROW = 4  # errors that span less are drawn on a linear axis
 
@@ -94,19 +92,19 @@ def draw_fronts(evaluation: Evaluation, found: Fronts):
     top, right = error * MARGIN, energy * MARGIN
     figure = Figure(figsize=(9, 6), layout="constrained")
     axes = figure.subplots()
-    axes.set(xscale="log", yscale="log", title=_title(evaluation))
+    axes.set(xscale="log", yscale="log", title=plain(_title(evaluation)))
     beyond = []
-    for (name, points), colour, marker, over in zip(found.items(), cycle(COLOURS), cycle(MARKERS), count(3, -0.01)):
+    for (name, points), colour, marker, over in zip(found.items(), cycle(LINES), cycle(MARKERS), count(3, -0.01)):
         near = [point for point in points if point.error.mean < top and point.energy.mean < right]
         beyond += [point for point in points if point not in near]
         _draw_line(axes, name, near, colour, marker, over)
     drawn = [point for point in joined(found.values()) if point not in beyond]
     left = min((point.energy.low for point in drawn if point.energy.low > 0), default=energy / 10) / MARGIN
     bottom = min((point.error.low for point in drawn if point.error.low > 0), default=error / 10) / MARGIN**0.5
-    axes.plot([left, energy, energy], [error, error, bottom], "--", color=BOX, linewidth=1, zorder=1)
+    axes.plot([left, energy, energy], [error, error, bottom], "--", color=GREY, linewidth=1, zorder=1)
     draw_floor(axes, evaluation)
     corner = dict(xytext=(-4, 5), textcoords="offset points", ha="right")
-    axes.annotate("reference point", (energy, error), color=BOX, fontsize=9, **corner)
+    axes.annotate("reference point", (energy, error), color=GREY, fontsize=9, **corner)
     if top < NARROW * bottom:
         axes.set_yscale("linear")
     axes.set(xlim=(left, right), ylim=(bottom, top), ylabel="mean error [m]")
@@ -117,7 +115,7 @@ def draw_fronts(evaluation: Evaluation, found: Fronts):
         axis.set_tick_params(which="both", labelsize=9)
     outside = [f"{p.policy}{_at(p)}: {p.energy.mean:.3g} mJ, {p.error.mean:.3g} m" for p in beyond]
     lines = fill("beyond: " + "; ".join(outside), 120) if outside else ""
-    axes.set_xlabel(f"energy [mJ per period]\n{lines}".rstrip())
+    axes.set_xlabel(plain(f"energy [mJ per period]\n{lines}".rstrip()))
     axes.grid(alpha=0.3, which="both", linewidth=0.5)
     axes.legend(frameon=False, loc="lower left")
     return figure
@@ -141,7 +139,7 @@ def _draw_line(axes, name: str, points: list[Point], colour: str, marker: str, o
     (x, x_low, x_high), (y, y_low, y_high) = (zip(*axis) for axis in zip(*ends))
     line = "-" if len(points) > 1 else "none"
     style = dict(color=colour, marker=marker, markersize=6, linestyle=line, linewidth=1.2, elinewidth=1)
-    style |= dict(label=name, zorder=over + (len(points) == 1))
+    style |= dict(label=plain(name), zorder=over + (len(points) == 1))
     axes.errorbar(x, y, xerr=[x_low, x_high], yerr=[y_low, y_high], **style)
     if len(points) == 1:
         return
@@ -153,7 +151,7 @@ def _draw_line(axes, name: str, points: list[Point], colour: str, marker: str, o
             text, place = _at(point), (2, 8)
         else:
             continue
-        axes.annotate(text, (x[i], y[i]), xytext=place, textcoords="offset points", fontsize=8, color=colour)
+        axes.annotate(plain(text), (x[i], y[i]), xytext=place, textcoords="offset points", fontsize=8, color=colour)
 
 
 def _at(point: Point) -> str:

@@ -17,6 +17,11 @@ def can_draw() -> bool:
     return find_spec("matplotlib") is not None
 
 
+def plain(text: str) -> str:
+    """A label that matplotlib shows as it is: dollars begin no formula, an underscore at the start hides nothing."""
+    return (" " if text.startswith("_") else "") + text.replace("$", r"\$")
+
+
 def write_picture(path: str | Path, figure, dpi: int = 140) -> None:
     """A figure as PNG, whole or not at all."""
     with replacing(path) as temporary:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
 from importlib.metadata import entry_points
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -65,6 +66,32 @@ def make_policy(name: str, scenario: Scenario, **parameters) -> Policy:
         return load_learned(path, scenario)
     ways = "(or FILE.py:CLASS, or the path of a policy.json)"
     raise ValueError(f"policy {name!r} is unknown: {suggest(name, policy_names())} {ways}")
+
+
+def named_policies(texts: Sequence[str], scenario: Scenario) -> dict[str, Policy]:
+    """Policies by label, from names, paths of saved policies, "FILE.py:Class", or "label=" and any of these.
+
+    Raises:
+        ValueError: for an unknown policy, or two with one label.
+    """
+    named: dict[str, Policy] = {}
+    for text in dict.fromkeys(texts):
+        if not isinstance(text, str):
+            raise ValueError(
+                f"policies: {type(text).__name__} is no name: give policies of your own as {{name: policy}}"
+            )
+        label, policy = _labelled(text, scenario)
+        if label in named:
+            raise ValueError(f"policies: {label!r} is there twice: labels must differ")
+        named[label] = policy
+    return named
+
+
+def _labelled(text: str, scenario: Scenario) -> tuple[str, Policy]:
+    """("ppo", policy) from "ppo=runs/mine/policy.json"; a name or a path alone is its own label."""
+    label, equals, source = text.partition("=")
+    labelled = equals and ":" not in label  # else parameters: quadrants:n=2
+    return (label, make_policy(source, scenario)) if labelled else (text, make_policy(text, scenario))
 
 
 def _given(colon: str, text: str) -> dict:

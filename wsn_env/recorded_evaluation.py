@@ -17,17 +17,21 @@ import numpy as np
 
 from wsn_env.bluetooth.calibration import calibrate, leave_one_out
 from wsn_env.bluetooth.dataset import DatasetError, read_dataset, track_files, track_name
-from wsn_env.evaluation import COLUMNS, Engine, Evaluation, evaluate, forget_blocks, stem_of, versions
+from wsn_env.colours import BLUE, DARK, GREEN, ORANGE, PURPLE, SKY, VERMILION, YELLOW
+from wsn_env.evaluation import COLUMNS, Evaluation, evaluate, stem_of
 from wsn_env.files import replacing
-from wsn_env.pictures import write_picture
+from wsn_env.kept_blocks import forget_blocks
+from wsn_env.pictures import can_draw, plain, write_picture
 from wsn_env.progress import Progress
 from wsn_env.quantity import ScenarioError
 from wsn_env.reports import wide_console
+from wsn_env.rollout import Engine
 from wsn_env.scenario import Scenario
 from wsn_env.sections import Beacon
+from wsn_env.versions import versions
 
-FILES = ("tracks.csv", "tracks.json", "tracks.md", "tracks.png")
 REFERENCE = "all"
+FAMILIES = (BLUE, ORANGE, GREEN, PURPLE, SKY, YELLOW)
 
 
 @dataclass(frozen=True)
@@ -109,7 +113,7 @@ def evaluate_recorded(
     evaluations = {}
     for number, (name, path) in enumerate(paths.items()):
         evaluations[name] = evaluate(
-            [policy.replace("{track}", name) for policy in policies],
+            of_track(policies, name),
             _replay(known[name], name, path),
             lams,
             seeds,
@@ -119,6 +123,11 @@ def evaluate_recorded(
             engine=engine,
         )
     return RecordedEvaluation(evaluations)
+
+
+def of_track(policies: Sequence[str], track: str) -> list[str]:
+    """Names of policies, with the track's for {track}."""
+    return [policy.replace("{track}", track) for policy in policies]
 
 
 def replay_scenario(scenario: Scenario, path: str | Path, calibrated: bool = False) -> Scenario:
@@ -207,7 +216,7 @@ def print_recorded(evaluation: RecordedEvaluation) -> None:
     console = wide_console()
     for lam in evaluation.first.lams:
         header, rows = table(evaluation, lam)
-        title = f"{evaluation.first.scenario.name}, {_what(evaluation)}, lam = {lam:g} m/mJ"
+        title = f"{evaluation.first.scenario.name}, {about_the_tracks(evaluation)}, lam = {lam:g} m/mJ"
         drawn = Table(title=title, caption="\n".join(remarks(evaluation, lam)))
         for name in header:
             drawn.add_column(name, justify="left" if name == "policy" else "right")
@@ -216,7 +225,8 @@ def print_recorded(evaluation: RecordedEvaluation) -> None:
         console.print(drawn)
 
 
-def _what(evaluation: RecordedEvaluation) -> str:
+def about_the_tracks(evaluation: RecordedEvaluation) -> str:
+    """How many there are, and how often each was replayed."""
     return f"{len(evaluation.by_track)} recorded tracks, {evaluation.first.episodes} filter seeds each"
 
 
@@ -225,15 +235,16 @@ def markdown(evaluation: RecordedEvaluation) -> str:
     parts = []
     for lam in evaluation.first.lams:
         header, rows = table(evaluation, lam)
-        lines = [f"## {_what(evaluation)}, lam = {lam:g} m/mJ", ""]
+        lines = [f"## {about_the_tracks(evaluation)}, lam = {lam:g} m/mJ", ""]
         lines += ["| " + " | ".join(header) + " |", "|---" + "|--:" * (len(header) - 1) + "|"]
         lines += ["| " + " | ".join(row) + " |" for row in rows]
         parts.append("\n".join([*lines, "", *(f"- {line}" for line in remarks(evaluation, lam))]))
     return "\n\n".join(parts) + "\n"
 
 
-def save_recorded(evaluation: RecordedEvaluation, out: str | Path) -> None:
-    """Write FILES into a folder, each whole or not at all, and forget the blocks kept there."""
+def save_recorded(evaluation: RecordedEvaluation, out: str | Path) -> list[str]:
+    """Write tracks.csv, .json, .md and, with matplotlib, .png into a folder, each whole or not at all; returns their
+    names."""
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
     with replacing(out / "tracks.csv") as path, open(path, "w", newline="") as file:
@@ -246,7 +257,16 @@ def save_recorded(evaluation: RecordedEvaluation, out: str | Path) -> None:
         path.write_text(json.dumps({"tracks": settings, "versions": versions()}, indent=1))
     with replacing(out / "tracks.md") as path:
         path.write_text(markdown(evaluation))
-    write_picture(out / "tracks.png", draw_recorded(evaluation))
+    names = ["tracks.csv", "tracks.json", "tracks.md"]
+    if can_draw():
+        names.append("tracks.png")
+        write_picture(out / "tracks.png", draw_recorded(evaluation))
+    return names
+
+
+def forget_recorded_blocks(evaluation: RecordedEvaluation, out: str | Path) -> None:
+    """Remove the kept blocks of a finished run."""
+    out = Path(out)
     for name in evaluation.by_track:
         forget_blocks(out / "tracks" / name)
         (out / "tracks" / name).rmdir()
@@ -262,7 +282,7 @@ def draw_recorded(evaluation: RecordedEvaluation):
     stems = evaluation.first.families()
     figure = Figure(figsize=(8, 5.2), layout="constrained")
     axes = figure.subplots()
-    colours = iter(("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#F0E442"))
+    colours = iter(FAMILIES)
     for stem in stems:
         members = evaluation.family(stem, lam)
         xs = [evaluation.mean(policy, lam, "energy_mj") for policy in members]
@@ -274,21 +294,21 @@ def draw_recorded(evaluation: RecordedEvaluation):
             marker="o",
             markersize=4,
             linewidth=1.2,
-            color=next(colours, "#333333"),
-            label=stem.rstrip(":=n"),
+            color=next(colours, DARK),
+            label=plain(stem.rstrip(":=n")),
         )
     for k, policy in enumerate(policies):
         if stem_of(policy) not in stems:
             points = [[evaluation.mean(policy, each, name) for name in ("energy_mj", "rms_m")] for each in lams]
             points = sorted(dict.fromkeys(map(tuple, points)))  # one, if it does not look at lam
             learned = policy.startswith("ppo")
-            style = dict(marker="*", markersize=13, color="#D55E00") if learned else dict(marker="s", color="#333333")
+            style = dict(marker="*", markersize=13, color=VERMILION) if learned else dict(marker="s", color=DARK)
             axes.plot(*zip(*points), linewidth=1.2, zorder=4 if learned else 3, **style)
             side = (6, 8) if k % 2 else (6, -13)
-            axes.annotate(policy, points[-1], xytext=side, textcoords="offset points", fontsize=9)
+            axes.annotate(plain(policy), points[-1], xytext=side, textcoords="offset points", fontsize=9)
     axes.set_xlabel("energy [mJ per period]")
     axes.set_ylabel("RMS error, mean over the tracks [m]")
-    axes.set_title(f"{evaluation.first.scenario.name}: {_what(evaluation)}")
+    axes.set_title(plain(f"{evaluation.first.scenario.name}: {about_the_tracks(evaluation)}"))
     axes.grid(alpha=0.3)
     if stems:
         axes.legend(frameon=False)

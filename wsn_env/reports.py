@@ -6,10 +6,12 @@ from math import pi, sqrt
 from pathlib import Path
 
 from wsn_env.bounds import bound_kind
+from wsn_env.colours import BLUE, DARK, GREEN, GREY, VERMILION
 from wsn_env.evaluation import Evaluation, stem_of
 from wsn_env.files import replacing
+from wsn_env.pictures import plain
 
-EMPHASIS, FAMILY, OTHER, FLOOR = "#D55E00", "#0072B2", "#333333", "#009E73"
+EMPHASIS, FAMILY, OTHER, FLOOR = VERMILION, BLUE, DARK, GREEN
 HEADER = ("policy", "return", "{} minus it", "RMS m", "RMS / {}", "energy mJ/period", "awake", "lost")
 ROUND = sqrt(pi) / 2  # mean error over RMS of a round Gaussian in the plane
 
@@ -141,7 +143,7 @@ def draw_front(evaluation: Evaluation, lam: float, emphasis: str | None = None):
         family = sorted(
             (points[policy][0].mean, points[policy][1].mean) for policy in points if stem_of(policy) == stem
         )
-        axes.plot(*zip(*family), color=FAMILY, linewidth=1, label=f"{stem}0, 1, ...", zorder=1)
+        axes.plot(*zip(*family), color=FAMILY, linewidth=1, label=plain(f"{stem}0, 1, ..."), zorder=1)
     draw_floor(axes, evaluation)
     axes.set_xscale("log")
     if emphasis is not None:
@@ -150,12 +152,12 @@ def draw_front(evaluation: Evaluation, lam: float, emphasis: str | None = None):
         cost = error.mean + lam * energy.mean
         xs = [limits[0] * (limits[1] / limits[0]) ** (i / 200) for i in range(201)]
         ys = [cost - lam * x for x in xs]
-        axes.plot(xs, ys, "--", color="#888888", linewidth=1, label=f"return of {emphasis}", zorder=1)
+        axes.plot(xs, ys, "--", color=GREY, linewidth=1, label=plain(f"return of {emphasis}"), zorder=1)
         axes.axis(limits)
     axes.legend(frameon=False)
     axes.set_xlabel("energy [mJ per period]")
     axes.set_ylabel("mean error [m]")
-    axes.set_title(f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes")
+    axes.set_title(plain(f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes"))
     axes.grid(alpha=0.3)
     return figure
 
@@ -183,4 +185,6 @@ def _draw_point(axes, policy: str, energy, error, strong: bool, numbered: bool) 
     )
     label = policy.removeprefix(stem_of(policy)) if numbered else policy
     place = (-11, -11) if numbered else (7, 5)
-    axes.annotate(label, (energy.mean, error.mean), xytext=place, textcoords="offset points", fontsize=9, color=colour)
+    axes.annotate(
+        plain(label), (energy.mean, error.mean), xytext=place, textcoords="offset points", fontsize=9, color=colour
+    )

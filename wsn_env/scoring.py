@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from gymnasium.vector import VectorEnv
 
-from wsn_env.evaluation import evaluation_seeds
+from wsn_env.rollout import evaluation_seeds
 
 
 def score(act: Callable, envs: VectorEnv, seed: int = 0) -> np.ndarray:

@@ -213,7 +213,11 @@ class State(NamedTuple):
 
     def copy(self) -> State:
         """A deep copy: no array is shared."""
-        return _copied(self)
+        return _each(np.copy, self)
+
+    def only(self, row: int) -> State:
+        """A batch of this row alone; it shares its arrays."""
+        return _each(lambda array: array[row : row + 1], self)
 
     def arrays(self) -> tuple[np.ndarray, ...]:
         """One after the other."""
@@ -247,8 +251,9 @@ def state_of(arrays):
     )
 
 
-def _copied(value):
-    return type(value)(*map(_copied, value)) if isinstance(value, tuple) else value.copy()
+def _each(change, value):
+    """A nest of tuples with every array changed."""
+    return type(value)(*(_each(change, part) for part in value)) if isinstance(value, tuple) else change(value)
 
 
 KEEP_HEAD, KEEP_CLUSTER, NOBODY = -1, -2, -3

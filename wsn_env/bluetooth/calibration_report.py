@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wsn_env import colours
 from wsn_env.bluetooth.calibration import (
     NUMBERS,
     Autocovariance,
@@ -36,8 +37,7 @@ SOURCE = (
     "with High Precision Position Annotation. Pervasive and Mobile Computing 81, 2022"
 )
 
-# Okabe and Ito's colours, which colour-blind readers tell apart.
-LINE, POINTS, SECOND, FAINT, BARS = "#0072B2", "#D55E00", "#009E73", "#999999", "#CCCCCC"
+LINE, POINTS, SECOND, FAINT, BARS = colours.BLUE, colours.VERMILION, colours.GREEN, colours.GREY, colours.FAINT
 COLUMNS = 4  # of the small multiples
 LOCAL_S = 1.5  # packets this far apart count 1/e in a local mean
 

@@ -6,21 +6,33 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wsn_env import draws
-from wsn_env.evaluation import episodes
+from wsn_env import colours, draws
 from wsn_env.policies import Policy
-from wsn_env.rendering.plan import shows_radius
+from wsn_env.rendering.plan import legend, shows_radius
+from wsn_env.rollout import episodes
 from wsn_env.scenario import Scenario
 from wsn_env.types import Outcome, State
+from wsn_env.view import View
 from wsn_env.world import World
 
+HUES = {  # by symbol of the frames' legend
+    "member": colours.BLUE,
+    "head": colours.VERMILION,
+    "sink": colours.VERMILION,
+    "heard": colours.ORANGE,
+    "report": colours.ORANGE,
+    "handover": colours.PURPLE,
+    "cloud": colours.SKY,
+    "target": colours.GREEN,
+    "search": colours.YELLOW,
+}
 CLOUD = 120  # particles shown of a period
 FINE, COARSE = 9999, 999  # steps across the room: of lines and of clouds
 
 
 @dataclass(frozen=True)
 class Episode:
-    """One episode under one policy; lists lead with the periods done, 0 first."""
+    """What one policy made of an episode; frames[k] is after k periods."""
 
     policy: str
     frames: list[dict]
@@ -29,20 +41,36 @@ class Episode:
     total: float  # return
 
 
-def record(name: str, policy: Policy, scenario: Scenario, seed: int) -> Episode:
-    """Play an episode, the very one of `reset(seed=seed)`.
+@dataclass(frozen=True)
+class Recording:
+    """An episode, and what each of some policies made of it."""
+
+    episodes: list[Episode]
+    common: dict  # the room, the nodes, the track
+
+
+def record(policies: dict[str, Policy], scenario: Scenario, seed: int) -> Recording:
+    """Play an episode, the very one of `reset(seed=seed)`, under each policy.
 
     Args:
+        policies: by name.
         scenario: with one lam.
+        seed: of the episode.
     """
     world = World(scenario, threads=1)
+    played = [_played(name, policy, world, seed) for name, policy in policies.items()]
+    return Recording(played, _common(world.reset([draws.key_of_seed(seed)]), scenario, seed))
+
+
+def _played(name: str, policy: Policy, world: World, seed: int) -> Episode:
+    scenario = world.scenario
     frames, squares, joules, total = [], [], [], 0.0
 
-    def begin(state: State) -> None:
-        frames.append(_frame(state, None, scenario))
-
-    for state, outcome in episodes(policy, world, [seed], begin):
+    def note(state: State, outcome: Outcome) -> None:
         frames.append(_frame(state, outcome, scenario))
+
+    for state, outcome in episodes(policy, world, [seed], begin=note):
+        note(state, outcome)
         squares.append(outcome.error_m[0] ** 2)
         joules.append(outcome.energy_mj[0])
         total -= outcome.error_m[0] + state.lam[0] * outcome.energy_mj[0]
@@ -50,12 +78,11 @@ def record(name: str, policy: Policy, scenario: Scenario, seed: int) -> Episode:
     return Episode(name, frames, float(np.sqrt(np.mean(scored))), float(np.mean(joules)), float(total))
 
 
-def common(scenario: Scenario, seed: int) -> dict:
-    """What all policies share: the room, the nodes, the track."""
-    state = World(scenario, threads=1).reset([draws.key_of_seed(seed)])
+def _common(state: State, scenario: Scenario, seed: int) -> dict:
     width, depth = scenario.field.room_m
     whole = max(width, depth)
     receiver = scenario.radio.receiver
+    searches = [("search", "search")] if scenario.tracking.search or scenario.tracking.start == "search" else []
     return {
         "scenario": scenario.name,
         "seed": seed,
@@ -67,6 +94,8 @@ def common(scenario: Scenario, seed: int) -> dict:
         "radius_m": scenario.radius_m if shows_radius(scenario) else None,
         "battery_j": scenario.radio.battery_j,
         "receiver": receiver,
+        "hue": HUES,
+        "legend": [(symbol, words) for symbol, words in legend(scenario) if symbol in HUES] + searches,
         "nodes": _steps(state.network.positions[0], whole),
         "track": _steps(state.track[0, :, ::2], whole),
     }
@@ -77,8 +106,8 @@ def _steps(points, whole: float, steps: int = FINE) -> list:
     return np.rint(np.asarray(points, float) * (steps / whole)).astype(int).ravel().tolist()
 
 
-def _frame(state: State, outcome: Outcome | None, scenario: Scenario) -> dict:
-    """One period of row 0."""
+def _frame(state: State, outcome: Outcome, scenario: Scenario) -> dict:
+    """A period of a batch of one."""
     whole = max(scenario.field.room_m)
     network, belief, reports = state.network, state.belief.row[0], state.reports
     x = state.belief.particles[0]
@@ -92,12 +121,10 @@ def _frame(state: State, outcome: Outcome | None, scenario: Scenario) -> dict:
         "members": network.members[0, : network.n_members[0]].tolist(),
         "heard": reports.node[0, : reports.count[0]].tolist(),
         "left_j": [[int(node), float(f"{network.battery[0, node]:.7g}")] for node in payers],
+        "error": round(float(outcome.error_m[0]), 3),
+        "energy": round(float(outcome.energy_mj[0]), 5),
+        "awake": int(outcome.members[0]),
+        "search": bool(outcome.searched[0]),
+        "handover": bool(outcome.handover[0]),
     }
-    if outcome is not None:
-        frame |= {
-            "error": round(float(outcome.error_m[0]), 3),
-            "energy": round(float(outcome.energy_mj[0]), 5),
-            "search": bool(outcome.searched[0]),
-            "handover": bool(outcome.handover[0]),
-        }
-    return frame
+    return frame | ({"detects": np.flatnonzero(View.of(state).sees[0]).tolist()} if scenario.binary else {})

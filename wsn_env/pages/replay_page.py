@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from wsn_env.files import replacing
 from wsn_env.pages.page import filled, script_safe, template, whole_page
-from wsn_env.pages.recording import Episode, common, record
+from wsn_env.pages.recording import Recording, record
 from wsn_env.policies import Policy
 from wsn_env.quantity import ScenarioError
 from wsn_env.scenario import Scenario
@@ -15,7 +14,7 @@ from wsn_env.scenario import Scenario
 MOST = 2  # policies side by side
 
 
-def replay(policies: dict[str, Policy], scenario: Scenario, seed: int, out: str | Path) -> list[Episode]:
+def replay(policies: dict[str, Policy], scenario: Scenario, seed: int, out: str | Path) -> Recording:
     """Play an episode and write its page.
 
     Args:
@@ -33,15 +32,15 @@ def replay(policies: dict[str, Policy], scenario: Scenario, seed: int, out: str 
         raise ScenarioError(f"Scenario.lam = {scenario.lam!r}: must be one number for a replay")
     if seed < 0:
         raise ValueError(f"seed = {seed}: must be at least 0")
-    recorded = [record(name, policy, scenario, seed) for name, policy in policies.items()]
-    page = whole_page("replay", f"{scenario.name}, seed {seed}", player(common(scenario, seed), recorded))
+    recording = record(policies, scenario, seed)
+    page = whole_page("replay", f"{scenario.name}, seed {seed}", player(recording))
     Path(out).parent.mkdir(parents=True, exist_ok=True)
     with replacing(out) as path:
         path.write_text(page, encoding="utf-8")
-    return recorded
+    return recording
 
 
-def player(shared: dict, recorded: Sequence[Episode]) -> str:
+def player(recording: Recording) -> str:
     """HTML of the player for a page; a page has room for one."""
-    data = shared | {"episodes": [vars(episode) for episode in recorded]}
+    data = recording.common | {"episodes": [vars(episode) for episode in recording.episodes]}
     return filled("player.html", data=script_safe(data), script=template("player.js"))

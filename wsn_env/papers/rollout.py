@@ -13,9 +13,9 @@ from math import ceil
 
 import numpy as np
 
-from wsn_env.evaluation import BLOCK, FIRST_SEED, episodes
 from wsn_env.policies import make_policy
 from wsn_env.progress import Progress
+from wsn_env.rollout import BLOCK, FIRST_SEED, episodes
 from wsn_env.scenario import Scenario
 from wsn_env.types import PURPOSES
 from wsn_env.world import World

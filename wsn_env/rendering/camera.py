@@ -82,7 +82,9 @@ def tiled(frames: tuple[np.ndarray, ...], gap: int = 2) -> np.ndarray:
 
 
 class Window:
-    """A window of pygame's, for good: closed by hand, it stays closed. Without a screen set SDL_VIDEODRIVER=dummy."""
+    """A window of pygame's, for good: closed by hand, it stays closed. pygame has one for all: who shows last has it.
+    Without a screen set SDL_VIDEODRIVER=dummy.
+    """
 
     def __init__(self, title: str, fps: int):
         if find_spec("pygame") is None:
@@ -103,7 +105,7 @@ class Window:
         import pygame
 
         size = picture.shape[1::-1]
-        if self._screen is None or self._screen.get_size() != size:
+        if not self._is_shown() or self._screen.get_size() != size:
             pygame.display.init()
             pygame.display.set_caption(self.title)
             self._screen, self._clock = pygame.display.set_mode(size), pygame.time.Clock()
@@ -113,9 +115,17 @@ class Window:
         if any(event.type == pygame.QUIT for event in pygame.event.get()):
             self.close()
 
+    def _is_shown(self) -> bool:
+        """Whether the only window that pygame has is this one."""
+        if self._screen is None:
+            return False
+        import pygame
+
+        return pygame.display.get_surface() is self._screen
+
     def close(self) -> None:
         """Close it; it stays closed."""
-        if self._screen is not None:
+        if self._is_shown():
             import pygame
 
             pygame.display.quit()

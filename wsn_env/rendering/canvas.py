@@ -70,6 +70,8 @@ class Canvas:
 
     def text(self, x: int, y: int, words: str, size: int, colour: Colour, ground: Colour = (255, 255, 255)) -> int:
         """Words on their ground from the left at x, with their line's upper edge at y; returns where they end."""
+        if not words:
+            return x
         line = _line(words, size, colour, ground)
         area = self.image[y : y + line.shape[0], x : x + line.shape[1]]
         area[:] = line[: area.shape[0], : area.shape[1]]

@@ -19,13 +19,14 @@ from wsn_env.rendering.palette import (
     PURPLE,
     SENSED,
     SKY,
-    VERMILLION,
+    VERMILION,
     YELLOW,
 )
 from wsn_env.rendering.plan import SEEN, SIZE, WORDS_FROM, Plan, legend, plan_of, shows_radius, widened
 from wsn_env.rendering.trail import Trail
 from wsn_env.scenario import Scenario
 from wsn_env.types import State
+from wsn_env.view import View
 
 ELLIPSE = 5.991**0.5  # of a Gaussian in two dimensions 95 % lie within so many sds
 FADED = 0.2  # the opacity of a tail's beginning
@@ -47,7 +48,8 @@ def frame(state: State, scenario: Scenario, trail: Trail, row: int = 0, size: in
     _write_head(canvas, plan, state, scenario, row, told, trail)
     if told["searched"]:
         _flash(canvas, plan)
-    awake = _awake(state, row)
+    view = View.of(state.only(row))
+    awake, sees = np.flatnonzero(view.member[0]), np.flatnonzero(view.sees[0])
     positions = plan.pixels(state.network.positions[row])
     if len(awake) and shows_radius(scenario):
         canvas.clip = plan.field
@@ -55,7 +57,7 @@ def frame(state: State, scenario: Scenario, trail: Trail, row: int = 0, size: in
     canvas.clip = widened(plan.field, round(9 * plan.unit) + 1)
     _draw_nodes(canvas, plan, state, scenario, row, positions)
     _draw_cloud(canvas, plan, state, row)
-    _draw_cluster(canvas, plan, state, scenario, row, positions, awake)
+    _draw_cluster(canvas, plan, state, scenario, row, positions, awake, sees)
     if told["handover"] and scenario.radio.receiver == "head":
         _draw_handover(canvas, plan, positions, trail.head[row], state.period[row])
     _draw_tracks(canvas, plan, state, scenario, row, trail)
@@ -66,17 +68,8 @@ def frame(state: State, scenario: Scenario, trail: Trail, row: int = 0, size: in
 
 
 def _flash(canvas: Canvas, plan: Plan) -> None:
-    left, top, right, bottom = plan.field
-    wide = max(2, round(4 * plan.unit))
-    canvas.box(left - wide, top - wide, right + wide, bottom + wide, YELLOW)
-    canvas.box(left, top, right, bottom, FLASH)
-
-
-def _awake(state: State, row: int) -> np.ndarray:
-    """The nodes of the standing cluster, its head first."""
-    network = state.network
-    head, members = network.head[row], network.members[row, : network.n_members[row]]
-    return np.concatenate([[head], members]) if head >= 0 else members.astype(np.int64)
+    canvas.box(*widened(plan.field, plan.flash), YELLOW)
+    canvas.box(*plan.field, FLASH)
 
 
 def _draw_nodes(canvas, plan, state, scenario, row, positions) -> None:
@@ -106,8 +99,8 @@ def _draw_cloud(canvas, plan, state, row) -> None:
         canvas.cloud(left + x * plan.scale, bottom - y * plan.scale, weights, SKY)
 
 
-def _draw_cluster(canvas, plan, state, scenario, row, positions, awake) -> None:
-    """Reports as lines to who receives them; rings about those that detected; the awake, the head, the sink."""
+def _draw_cluster(canvas, plan, state, scenario, row, positions, awake, sees) -> None:
+    """Reports as lines to who receives them; rings about those that see; the awake, the head, the sink."""
     unit, receiver = plan.unit, scenario.radio.receiver
     head = state.network.head[row]
     reported = state.reports.node[row, : state.reports.count[row]]
@@ -122,29 +115,19 @@ def _draw_cluster(canvas, plan, state, scenario, row, positions, awake) -> None:
         canvas.lines(positions[reported], np.broadcast_to(centre, (len(reported), 2)), max(1.2, 2.2 * unit), ORANGE)
     radius = max(5.5 * unit, 2.2)
     leads = head >= 0 and receiver == "head"
-    seen = _detecting(state, row, awake, reported)
     ring = radius + max(3.5 * unit, 1.8)
-    canvas.discs(positions[seen[seen != head]] if leads else positions[seen], ring, ORANGE, hole=ring - 2 * unit)
+    canvas.discs(positions[sees[sees != head]] if leads else positions[sees], ring, ORANGE, hole=ring - 2 * unit)
     canvas.discs(positions[awake], radius, BLUE)
     if leads:
         wide = radius + max(2.5 * unit, 1.2)
-        if head in seen:
+        if head in sees:
             ring = wide + max(3.5 * unit, 1.8)
             canvas.discs(centre, ring, ORANGE, hole=ring - 2 * unit)
         canvas.discs(centre, wide + max(unit, 0.7), PAPER)
-        canvas.discs(centre, wide, VERMILLION)
+        canvas.discs(centre, wide, VERMILION)
     elif receiver == "sink":
         canvas.discs(centre, 1.3 * radius + max(unit, 0.7), PAPER, square=True)
-        canvas.discs(centre, 1.3 * radius, VERMILLION, square=True)
-
-
-def _detecting(state, row, awake, reported) -> np.ndarray:
-    """Who reported in the period; of binary sensors those, awake or asked, whose state is 1."""
-    bitmap = state.reports.bitmap[row]
-    if not len(bitmap):
-        return reported
-    asked = np.union1d(awake, reported).astype(np.int64)
-    return asked[bitmap[asked] > 0]
+        canvas.discs(centre, 1.3 * radius, VERMILION, square=True)
 
 
 def _draw_handover(canvas, plan, positions, heads, period) -> None:
@@ -186,19 +169,20 @@ def _root(cov) -> np.ndarray:
 def _write_head(canvas, plan, state, scenario, row, told, trail) -> None:
     """Above the field: scenario, period, what is going on; the numbers of the period and of the episode so far."""
     font, edge, y = plan.font, plan.font // 2 + 1, plan.font // 3
-    x = canvas.text(edge, y, scenario.name, font, INK) if canvas.width >= WORDS_FROM else edge - font
-    canvas.text(x + font, y, f"period {state.period[row]} of {scenario.periods}", font, DIM)
+    x = canvas.text(edge, y, scenario.name, font, INK) + font if canvas.width >= WORDS_FROM else edge
     right = canvas.width - edge
+    words = f"period {state.period[row]} of {scenario.periods}"
+    if x + text_width(words, font) > right:
+        words = f"{state.period[row]}/{scenario.periods}"
+    taken = canvas.text(x, y, words, font, DIM)
     nodes, alive = state.network.battery.shape[1], state.network.row["alive"][row]
     if alive < nodes:
         words = f"{alive} of {nodes} alive" if alive else "all dead"
-        right -= text_width(words, font)
-        canvas.text(right, y, words, font, DIM if alive else VERMILLION)
-        right -= font // 2
+        right = _chip(canvas, plan, taken, right, y, words, PAPER, DIM if alive else VERMILION)
     if told["searched"]:
-        right = _chip(canvas, plan, right, y, "search", YELLOW, INK)
+        right = _chip(canvas, plan, taken, right, y, "search", YELLOW, INK)
     if told["handover"] and scenario.radio.receiver == "head":
-        _chip(canvas, plan, right, y, "handover", PURPLE, INK)
+        _chip(canvas, plan, taken, right, y, "handover", PURPLE, INK)
     if canvas.width < WORDS_FROM:
         return
     y += plan.line
@@ -215,18 +199,20 @@ def _write(canvas, x, y, pairs, font) -> None:
         x = canvas.text(canvas.text(x, y, label, font, DIM), y, value, font, INK)
 
 
-def _chip(canvas, plan, right, y, words, colour, ink) -> int:
-    """A word on a coloured ground, ending at `right`; returns where the next may end."""
+def _chip(canvas, plan, taken, right, y, words, colour, ink) -> int:
+    """A word on a coloured ground between `taken` and `right`, if it fits; returns where the next may end."""
     pad = plan.font // 3
     left = right - text_width(words, plan.font) - 2 * pad
+    if left < taken + pad:
+        return right
     canvas.box(left, y - pad // 2, right, y + plan.line - pad // 2, colour)
     canvas.text(left + pad, y, words, plan.font, ink, colour)
     return left - pad
 
 
 def figure(value: float) -> str:
-    """A number with about three digits."""
-    return f"{value:.{2 if value < 9.995 else 1 if value < 99.95 else 0}f}"
+    """A number with three digits, whole ones in full."""
+    return f"{value:.0f}" if value >= 99.95 else f"{value:#.3g}" if value >= 1e-3 else f"{value:.2g}"
 
 
 def joules(energy_mj: float) -> str:

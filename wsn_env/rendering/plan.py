@@ -9,7 +9,7 @@ import numpy as np
 
 from wsn_env.rendering.canvas import Canvas, text_width
 from wsn_env.rendering.marks import draw_arrow, draw_crosses, draw_estimate, draw_target
-from wsn_env.rendering.palette import BLUE, DIM, EMPTY, FRAME, FULL, INK, ORANGE, PAPER, SENSED, SKY, VERMILLION
+from wsn_env.rendering.palette import BLUE, DIM, EMPTY, FRAME, FULL, INK, ORANGE, PAPER, SENSED, SKY, VERMILION
 from wsn_env.scenario import Scenario
 
 SIZE, SMALLEST = 600, 64  # pixels
@@ -26,6 +26,7 @@ class Plan(NamedTuple):
     unit: float  # px that are one of SIZE's
     scale: float  # px/m
     field: tuple[int, int, int, int]  # left, top, right, bottom
+    flash: int  # px about the field that a search colours
 
     def pixels(self, points) -> np.ndarray:
         """(..., 2) from m."""
@@ -41,12 +42,13 @@ def plan_of(size: int, name: str, room_m: tuple[float, float], entries: tuple[tu
     lines = _flowed(entries, font, size - font) if size >= WORDS_FROM else []
     head = (2 if lines else 1) * line + font // 3
     low = size - len(lines) * line - (font // 2 if lines else 0)
-    wide, tall = size - 2 * edge, low - head - edge // 2 - line - 2
+    flash = max(2, round(4 * unit))
+    wide, tall = size - 2 * edge, low - head - edge // 2 - line - flash
     scale = min(wide / room_m[0], tall / room_m[1])
     left, top = round((size - scale * room_m[0]) / 2), head + edge // 2 + round((tall - scale * room_m[1]) / 2)
     field = (left, top, left + round(scale * room_m[0]), top + round(scale * room_m[1]))
     paper = np.full((size, size, 3), PAPER, np.uint8)
-    plan = Plan(paper, font, line, unit, scale, field)
+    plan = Plan(paper, font, line, unit, scale, field, flash)
     canvas = Canvas(paper)
     canvas.box(*widened(field, 1), FRAME)
     canvas.box(*field, PAPER)
@@ -80,7 +82,7 @@ def shows_radius(scenario: Scenario) -> bool:
 def _heard(scenario: Scenario) -> str:
     if scenario.binary:
         return "detects"
-    return "has heard" if scenario.hears or scenario.radio.receiver == "target" else "detected"
+    return "has heard" if scenario.hears or scenario.radio.receiver == "target" else "reported"
 
 
 def _flowed(entries, font, width) -> list[list[tuple[int, str, str]]]:
@@ -108,9 +110,9 @@ def _draw_symbol(canvas, plan, symbol, centre) -> None:
     elif symbol == "member":
         canvas.discs(centre, radius, BLUE)
     elif symbol == "head":
-        canvas.discs(centre, radius + max(2.0 * unit, 1.0), VERMILLION)
+        canvas.discs(centre, radius + max(2.0 * unit, 1.0), VERMILION)
     elif symbol == "sink":
-        canvas.discs(centre, 1.3 * radius, VERMILLION, square=True)
+        canvas.discs(centre, 1.3 * radius, VERMILION, square=True)
     elif symbol == "radius":
         canvas.discs(centre, 0.5 * plan.font, SENSED[1])
     elif symbol == "heard":
@@ -130,14 +132,15 @@ def _draw_symbol(canvas, plan, symbol, centre) -> None:
 
 
 def _draw_ruler(canvas, plan, room_m) -> None:
-    """A length on the field's lower edge."""
+    """A length below the field."""
     wished = room_m[0] / 5
     power = 10.0 ** np.floor(np.log10(wished))
     length = max(step * power for step in (1, 2, 5) if step * power <= wished)
     left, _, _, bottom = plan.field
     end = left + length * plan.scale
-    canvas.lines((left, bottom), (end, bottom), max(2.0, 3.0 * plan.unit), DIM)
-    canvas.text(round(end) + plan.font // 2, bottom + round(0.12 * plan.font), f"{length:g} m", plan.font, DIM)
+    y = bottom + plan.flash
+    canvas.lines((left, y + 0.6 * plan.font), (end, y + 0.6 * plan.font), max(2.0, 3.0 * plan.unit), DIM)
+    canvas.text(round(end) + plan.font // 2, y, f"{length:g} m", plan.font, DIM)
 
 
 def widened(box, by: int) -> tuple[int, int, int, int]:

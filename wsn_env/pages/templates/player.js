@@ -1,10 +1,8 @@
 "use strict";
-// Okabe and Ito's palette: told apart by colour-blind eyes too.
-const HUE = { member: "#0072b2", head: "#d55e00", cloud: "#56b4e9", truth: "#009e73", report: "#e69f00", handover: "#cc79a7",
-  search: "#f0e442" };
 const SDS = 2.45; // of a Gaussian in two dimensions 95 % lie within so many
 const data = JSON.parse(document.getElementById("data").textContent);
 const episodes = data.episodes;
+const HUE = data.hue;
 const last = episodes[0].frames.length - 1;
 const nodes = pairs(data.nodes, data.unit_m);
 const track = pairs(data.track, data.unit_m);
@@ -30,7 +28,7 @@ for (const episode of episodes) {
     for (const [node, battery] of frame.left_j) left[node] = battery;
     return Float64Array.from(left);
   });
-  episode.awake = episode.frames.map((frame) => new Set(frame.head < 0 ? frame.members : [frame.head, ...frame.members]));
+  episode.cluster = episode.frames.map((frame) => new Set(frame.head < 0 ? frame.members : [frame.head, ...frame.members]));
   episode.least = Math.min(...left) / data.battery_j;
 }
 
@@ -101,7 +99,7 @@ function ellipse(pen, at, [xx, xy, yy], scale) {
 
 function drawField(view) {
   const { episode } = view;
-  const frame = episode.frames[period], left = episode.left[period], awake = episode.awake[period];
+  const frame = episode.frames[period], left = episode.left[period], cluster = episode.cluster[period];
   const [pen, width] = sized(view.canvas);
   const place = scaleOf(width), scale = (width - 24) / whole;
   const [x0, y0] = place([0, data.room_m[1]]);
@@ -117,7 +115,7 @@ function drawField(view) {
     pen.beginPath();
     pen.rect(x0, y0, data.room_m[0] * scale, data.room_m[1] * scale);
     pen.clip();
-    for (const node of awake) disc(pen, place(nodes[node]), data.radius_m * scale, colour("--shade"));
+    for (const node of cluster) disc(pen, place(nodes[node]), data.radius_m * scale, colour("--shade"));
     pen.restore();
   }
   pen.fillStyle = HUE.cloud + "90";
@@ -139,25 +137,24 @@ function drawField(view) {
   if (leads && frame.handover && episode.frames[period - 1].head >= 0)
     line(pen, [place(nodes[episode.frames[period - 1].head]), place(nodes[frame.head])], HUE.handover, 3);
   pen.lineWidth = 2;
-  for (const node of frame.heard) disc(pen, place(nodes[node]), leads && node === frame.head ? 10 : 8, null, HUE.report);
-  for (const node of awake) disc(pen, place(nodes[node]), 5, HUE.member);
+  for (const node of frame.detects ?? frame.heard) disc(pen, place(nodes[node]), leads && node === frame.head ? 10 : 8, null, HUE.report);
+  for (const node of cluster) disc(pen, place(nodes[node]), 5, HUE.member);
   if (leads) disc(pen, place(nodes[frame.head]), 7, HUE.head);
   if (data.receiver === "sink") { const [x, y] = place(to); pen.fillStyle = HUE.head; pen.fillRect(x - 6, y - 6, 12, 12); }
   const since = Math.max(0, period - 30);
-  line(pen, track.slice(since, period + 1).map(place), HUE.truth, 2.5);
+  line(pen, track.slice(since, period + 1).map(place), HUE.target, 2.5);
   line(pen, episode.frames.slice(since, period + 1).map((f) => place([f.mean[0] * data.unit_m, f.mean[1] * data.unit_m])),
     colour("--ink"), 1, [3, 3]);
   ellipse(pen, place(mean), frame.cov, scale);
   pen.lineWidth = 3;
-  disc(pen, place(track[period]), 5.5, null, HUE.truth);
+  disc(pen, place(track[period]), 5.5, null, HUE.target);
   const [x, y] = place(mean);
   line(pen, [[x - 6, y], [x + 6, y]], colour("--ink"), 2);
   line(pen, [[x, y - 6], [x, y + 6]], colour("--ink"), 2);
   if (view.hovered >= 0) { pen.lineWidth = 2; disc(pen, place(nodes[view.hovered]), 9, null, colour("--ink")); }
-  const spent = episode.frames.slice(1, period + 1).reduce((sum, f) => sum + f.energy, 0);
-  view.numbers.textContent = period === 0 ? "before the first period"
-    : `error ${frame.error.toFixed(2)} m · ${awake.size} awake · ${joules(spent)} so far`
-      + (frame.search ? " · search" : "") + (frame.handover ? " · handover" : "");
+  const spent = episode.frames.slice(0, period + 1).reduce((sum, f) => sum + f.energy, 0);
+  view.numbers.textContent = `error ${frame.error.toFixed(2)} m · ${frame.awake} awake · ${joules(spent)} so far`
+    + (frame.search ? " · search" : "") + (frame.handover ? " · handover" : "");
 }
 
 function hover(view, event) {
@@ -172,11 +169,13 @@ function hover(view, event) {
   const tip = element("tip");
   tip.hidden = best < 0;
   if (best >= 0) {
-    const periods = view.episode.awake.slice(0, period + 1).map((set, k) => (set.has(best) ? k : -1)).filter((k) => k > 0);
-    const heard = view.episode.frames.slice(1, period + 1).filter((f) => f.heard.includes(best)).length;
+    const { frames, cluster, left } = view.episode;
+    const awake = (k) => cluster[k].has(best) || (frames[k].search && left[k - 1][best] > 0); // a search wakes all
+    const periods = [...Array(period + 1).keys()].filter((k) => k > 0 && awake(k));
+    const heard = frames.slice(1, period + 1).filter((f) => f.heard.includes(best)).length;
     const [x, y] = nodes[best];
     tip.textContent = `node ${best} at (${x.toFixed(1)}, ${y.toFixed(1)}) m\n`
-      + `battery ${(100 * view.episode.left[period][best] / data.battery_j).toFixed(3)} %\n`
+      + `battery ${(100 * left[period][best] / data.battery_j).toFixed(3)} %\n`
       + `awake in ${periods.length} of ${period} periods${periods.length ? `, last in ${periods.at(-1)}` : ""}\n`
       + `reported in ${heard}`;
     tip.style.left = `${Math.min(event.clientX + 14, innerWidth - 270)}px`;
@@ -236,7 +235,7 @@ function draw() {
 function seek(to) {
   period = Math.min(Math.max(to, 0), last);
   element("slider").value = period;
-  element("period").textContent = `period ${period} of ${last}, ${(period * data.period_s).toFixed(0)} s`;
+  element("period").textContent = `period ${period} of ${last}, ${Number((period * data.period_s).toPrecision(6))} s`;
   if (period === last) pause();
   draw();
 }
@@ -278,16 +277,13 @@ element("slider").max = last;
 element("slider").oninput = (event) => seek(Number(event.target.value));
 element("about").textContent = `lam = ${data.lam} m/mJ` + episodes.map((episode) =>
   ` · ${episode.policy}: RMS ${episode.rms_m.toFixed(3)} m, ${joules(episode.energy_mj)} a period, return ${episode.total.toFixed(1)}`).join("");
-const words = [["truth", "target"], ["head", data.receiver === "sink" ? "sink" : "head"], ["member", "awake"], ["report", "report"],
-  ["cloud", "particles"], ["handover", "handover"], ["search", "search"]];
-for (const [hue, word] of words) {
-  if ((hue === "head" && data.receiver === "target") || (hue === "handover" && data.receiver !== "head")) continue;
-  const entry = document.createElement("span"), dot = document.createElement("i");
-  dot.style.background = HUE[hue];
-  entry.append(dot, word);
+for (const [symbol, word] of data.legend) {
+  const entry = document.createElement("span"), mark = document.createElement("i");
+  mark.style[["heard", "target"].includes(symbol) ? "borderColor" : "background"] = HUE[symbol];
+  entry.append(mark, word);
   element("legend").append(entry);
 }
-element("legend").append("ring: has reported; cross: estimate; ellipse: 95 %; " + (data.radius_m ? "shade: sensing range; " : "") + "grey: asleep, fading with its battery");
+element("legend").append("cross: estimate; ellipse: 95 %; " + (data.radius_m ? "shade: sensing range; " : "") + "grey: asleep, fading with its battery");
 new ResizeObserver(draw).observe(document.body);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 seek(0);

@@ -12,8 +12,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from wsn_env import draws
-from wsn_env.evaluation import FIRST_SEED
 from wsn_env.papers.binary.systems import SIDE_M, VELOCITY_MS, Setting
+from wsn_env.rollout import FIRST_SEED
 from wsn_env.world import World
 
 V = np.array(VELOCITY_MS)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wsn_env.papers.colours import BLACK, BLUE, GREEN, GREY, PURPLE, SKY, VERMILION
+from wsn_env.colours import BLACK, BLUE, GREEN, GREY, PURPLE, SKY, VERMILION
 from wsn_env.papers.grnn.systems import ANCHORS, EQUAL_INFORMATION, METHODS, PERIODS_S, STARTED, Results
 from wsn_env.papers.report import Sheet, new_axes, write_sheet
 from wsn_env.pictures import write_picture

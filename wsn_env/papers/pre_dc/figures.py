@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wsn_env.papers.colours import BLACK, BLUE, GREEN, GREY, VERMILION
+from wsn_env.colours import BLACK, BLUE, DARK, GREEN, GREY, VERMILION
 from wsn_env.papers.pre_dc.systems import MOTIONS, PARTICLES, SYSTEMS, Results
 from wsn_env.papers.report import Sheet, by_period, new_axes, tidy, write_sheet
 from wsn_env.papers.rollout import standard_error
@@ -116,7 +116,7 @@ def draw_detection(sheet: Sheet, detection: Detection):
     marks = ((inner, "(1 - δ) r"), (detection.radius_m, "r"), (detection.reach_m, "(1 + δ) r"))
     for x, name in marks:
         axes.axvline(x, color=GREY, linewidth=0.8, linestyle=":")
-        axes.annotate(name, (x, 0.675), xytext=(3, 0), textcoords="offset points", fontsize=9, color="#555555")
+        axes.annotate(name, (x, 0.675), xytext=(3, 0), textcoords="offset points", fontsize=9, color=DARK)
     axes.set(xlim=(0, 15), ylim=(0, 0.72))
     return figure
 

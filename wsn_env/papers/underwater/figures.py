@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wsn_env.papers.colours import BLUE, GREEN, GREY, PURPLE, SKY, VERMILION, YELLOW
+from wsn_env.colours import BLUE, GREEN, GREY, PURPLE, SKY, VERMILION, YELLOW
 from wsn_env.papers.report import Sheet, by_period, new_axes, write_sheet
 from wsn_env.papers.rollout import Record
 from wsn_env.papers.underwater.claims import energy_j
