@@ -20,8 +20,9 @@ from wsn_env.rendering.plan import SIZE
 
 SEED, PERIODS = 7, 25
 POLICIES = (  # where a policy is at home
-    *((name, "PreDC-v0") for name in "pre_dc centroid static_cluster nearest3 adaptive greedy ppo random".split()),
-    *((name, "Rssi-v0") for name in ("informed3",)),
+    *((name, "PreDC-v0") for name in "pre_dc centroid static_cluster nearest3 adaptive greedy random".split()),
+    *((name, "PreDC-v0") for name in ("planner", "ppo")),
+    *((name, "Rssi-v0") for name in ("informed3", "adaptive_informed")),
     *((name, "Binary-v0") for name in ("boundary",)),
     *((name, "Underwater-v0") for name in ("strongest_signal",)),
     *((name, "Ble-v0") for name in ("all", "strongest", "quadrants", "every")),

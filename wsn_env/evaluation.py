@@ -94,6 +94,11 @@ class Evaluation:
         stems = [stem_of(policy) for policy in self.policies if stem_of(policy) != policy]
         return [stem for stem in dict.fromkeys(stems) if stems.count(stem) > 1]
 
+    def family_name(self, stem: str) -> str:
+        """ "nearest0..8", by the least and the largest number that was compared."""
+        numbers = [int(policy.removeprefix(stem)) for policy in self.policies if policy != stem == stem_of(policy)]
+        return f"{stem}{min(numbers)}..{max(numbers)}"
+
     def best_of(self, stem: str, lam: float) -> str:
         """The member of a numbered family with the best mean return: the best in hindsight.
 

@@ -21,12 +21,13 @@ from wsn_env.front import (
     save_front,
 )
 from wsn_env.pictures import plain, write_picture
-from wsn_env.reports import draw_floor, interval_text, wide_console
+from wsn_env.reports import draw_floor, interval_text, plain_ticks, wide_console
 
 FRONT_FILES = ("front.csv", "front.json", "front.png")
 
 MARKERS = "osD^vP*X<>p"  # for where colours run out or into each other
 MARGIN = 1.2  # of the picture beyond the reference point and the best figures, as a factor
+LETTER = (6, 14)  # px that one takes
 NARROW = 4  # errors that span less are drawn on a linear axis
 
 
@@ -93,11 +94,12 @@ def draw_fronts(evaluation: Evaluation, found: Fronts):
     figure = Figure(figsize=(9, 6), layout="constrained")
     axes = figure.subplots()
     axes.set(xscale="log", yscale="log", title=plain(_title(evaluation)))
-    beyond = []
+    beyond, labels = [], []
     for (name, points), colour, marker, over in zip(found.items(), cycle(LINES), cycle(MARKERS), count(3, -0.01)):
         near = [point for point in points if point.error.mean < top and point.energy.mean < right]
         beyond += [point for point in points if point not in near]
         _draw_line(axes, name, near, colour, marker, over)
+        labels += [(*label, colour) for label in _labels(near)]
     drawn = [point for point in joined(found.values()) if point not in beyond]
     left = min((point.energy.low for point in drawn if point.energy.low > 0), default=energy / 10) / MARGIN
     bottom = min((point.error.low for point in drawn if point.error.low > 0), default=error / 10) / MARGIN**0.5
@@ -110,9 +112,8 @@ def draw_fronts(evaluation: Evaluation, found: Fronts):
     axes.set(xlim=(left, right), ylim=(bottom, top), ylabel="mean error [m]")
     for axis in (axes.xaxis, axes.yaxis):
         if axis.get_scale() == "log":
-            axis.set_major_formatter(lambda value, _: f"{value:g}")
-            axis.set_minor_formatter(_few_digits)
-        axis.set_tick_params(which="both", labelsize=9)
+            plain_ticks(axis)
+    _write_labels(axes, labels)
     outside = [f"{p.policy}{_at(p)}: {p.energy.mean:.3g} mJ, {p.error.mean:.3g} m" for p in beyond]
     lines = fill("beyond: " + "; ".join(outside), 120) if outside else ""
     axes.set_xlabel(plain(f"energy [mJ per period]\n{lines}".rstrip()))
@@ -126,11 +127,6 @@ def _digits(scale: float) -> int:
     return max(0, 3 - floor(log10(scale)))
 
 
-def _few_digits(value: float, _position) -> str:
-    """The minor ticks 2, 3, 5 and 7 of a decade."""
-    return f"{value:g}" if f"{value:e}"[0] in "2357" else ""
-
-
 def _draw_line(axes, name: str, points: list[Point], colour: str, marker: str, over: float) -> None:
     if not points:
         return
@@ -141,17 +137,26 @@ def _draw_line(axes, name: str, points: list[Point], colour: str, marker: str, o
     style = dict(color=colour, marker=marker, markersize=6, linestyle=line, linewidth=1.2, elinewidth=1)
     style |= dict(label=plain(name), zorder=over + (len(points) == 1))
     axes.errorbar(x, y, xerr=[x_low, x_high], yerr=[y_low, y_high], **style)
-    if len(points) == 1:
-        return
-    policies = {point.policy for point in points}
-    for i, point in enumerate(points):
-        if len(policies) > 1:
-            text, place = numbered(point.policy)[1], (-9, -11)
-        elif i in (0, len(points) - 1):
-            text, place = _at(point), (2, 8)
-        else:
-            continue
-        axes.annotate(plain(text), (x[i], y[i]), xytext=place, textcoords="offset points", fontsize=8, color=colour)
+
+
+def _labels(points: list[Point]) -> list[tuple[str, tuple[float, float], tuple[int, int]]]:
+    """Words, point and offset [pt]: a family's numbers, or the lams at the ends of a policy's front."""
+    if len({point.policy for point in points}) > 1:
+        return [(numbered(p.policy)[1], (p.energy.mean, p.error.mean), (-9, -11)) for p in points]
+    by_lam = sorted(points, key=lambda point: point.lam or 0)
+    ends = (by_lam[0], by_lam[-1]) if len(points) > 1 else ()
+    return [(_at(p), (p.energy.mean, p.error.mean), (2, 8)) for p in ends]
+
+
+def _write_labels(axes, labels) -> None:
+    """Those of earlier fronts first; what would lie on another is left out."""
+    taken = []
+    for text, point, place, colour in labels:
+        x, y = axes.transData.transform(point) + place
+        if all(abs(x - left) > LETTER[0] * max(n, len(text)) or abs(y - low) > LETTER[1] for left, low, n in taken):
+            taken.append((x, y, len(text)))
+            style = dict(xytext=place, textcoords="offset points", fontsize=8, color=colour)
+            axes.annotate(plain(text), point, **style)
 
 
 def _at(point: Point) -> str:

@@ -69,7 +69,7 @@ def interval_text(value, digits: int, sign: str = "") -> str:
 
 def best_in_hindsight(evaluation: Evaluation, lam: float) -> list[str]:
     """A line on the best member of each numbered family, if there is one."""
-    best = [f"{evaluation.best_of(stem, lam)} of {stem}0, 1, ..." for stem in evaluation.families()]
+    best = [f"{evaluation.best_of(stem, lam)} of {evaluation.family_name(stem)}" for stem in evaluation.families()]
     return [f"best in hindsight: {', '.join(best)}"] if best else []
 
 
@@ -143,9 +143,10 @@ def draw_front(evaluation: Evaluation, lam: float, emphasis: str | None = None):
         family = sorted(
             (points[policy][0].mean, points[policy][1].mean) for policy in points if stem_of(policy) == stem
         )
-        axes.plot(*zip(*family), color=FAMILY, linewidth=1, label=plain(f"{stem}0, 1, ..."), zorder=1)
+        axes.plot(*zip(*family), color=FAMILY, linewidth=1, label=plain(evaluation.family_name(stem)), zorder=1)
     draw_floor(axes, evaluation)
     axes.set_xscale("log")
+    plain_ticks(axes.xaxis)
     if emphasis is not None:
         energy, error = points[emphasis]
         limits = axes.axis()
@@ -160,6 +161,13 @@ def draw_front(evaluation: Evaluation, lam: float, emphasis: str | None = None):
     axes.set_title(plain(f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes"))
     axes.grid(alpha=0.3)
     return figure
+
+
+def plain_ticks(axis) -> None:
+    """Numbers in full at 1, 2, 3, 5 and 7 of each decade of a logarithmic axis."""
+    axis.set_major_formatter(lambda value, _: f"{value:g}")
+    axis.set_minor_formatter(lambda value, _: f"{value:g}" if f"{value:e}"[0] in "2357" else "")
+    axis.set_tick_params(which="both", labelsize=9)
 
 
 def draw_floor(axes, evaluation: Evaluation) -> None:
