@@ -5,6 +5,8 @@ from __future__ import annotations
 from math import pi, sqrt
 from pathlib import Path
 
+import numpy as np
+
 from wsn_env.bounds import bound_kind
 from wsn_env.colours import BLUE, DARK, GREEN, GREY, VERMILION
 from wsn_env.evaluation import Evaluation, stem_of
@@ -13,6 +15,7 @@ from wsn_env.pictures import plain
 
 EMPHASIS, FAMILY, OTHER, FLOOR = VERMILION, BLUE, DARK, GREEN
 HEADER = ("policy", "return", "{} minus it", "RMS m", "RMS / {}", "energy mJ/period", "awake", "lost")
+NARROW = 3  # energies that span less are drawn on a linear axis
 ROUND = sqrt(pi) / 2  # mean error over RMS of a round Gaussian in the plane
 
 
@@ -145,14 +148,15 @@ def draw_front(evaluation: Evaluation, lam: float, emphasis: str | None = None):
         )
         axes.plot(*zip(*family), color=FAMILY, linewidth=1, label=plain(evaluation.family_name(stem)), zorder=1)
     draw_floor(axes, evaluation)
-    axes.set_xscale("log")
-    plain_ticks(axes.xaxis)
+    energies = [energy.mean for energy, _ in points.values()]
+    if max(energies) > NARROW * min(energies):
+        axes.set_xscale("log")
+        plain_ticks(axes.xaxis)
     if emphasis is not None:
         energy, error = points[emphasis]
         limits = axes.axis()
-        cost = error.mean + lam * energy.mean
-        xs = [limits[0] * (limits[1] / limits[0]) ** (i / 200) for i in range(201)]
-        ys = [cost - lam * x for x in xs]
+        xs = np.linspace(*limits[:2], 1000)
+        ys = error.mean + lam * (energy.mean - xs)
         axes.plot(xs, ys, "--", color=GREY, linewidth=1, label=plain(f"return of {emphasis}"), zorder=1)
         axes.axis(limits)
     axes.legend(frameon=False)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from wsn_env.compiling import lean_piece
-from wsn_env.interface.merit import chance, gain
+from wsn_env.interface.merit import chance, gain, place_of
 from wsn_env.numerics import log
 from wsn_env.physics.field import squared_distance
 from wsn_env.types import Sensors
@@ -139,10 +139,10 @@ def describe_merit(nodes, ordered, drops, spread, width, f):
     for slot in range(len(ordered)):
         if ordered[slot] < 0:
             break
-        for k in range(len(nodes)):
-            if nodes[k] == ordered[slot]:
-                f[k * width + width - 2] = 1.0 / (1.0 + slot)
-                f[k * width + width - 1] = drops[slot] / spread
+        k = place_of(ordered[slot], nodes)
+        if k >= 0:
+            f[k * width + width - 2] = 1.0 / (1.0 + slot)
+            f[k * width + width - 1] = drops[slot] / spread
 
 
 @lean_piece
