@@ -178,14 +178,20 @@ def browser(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def opened(browser, tmp_path_factory):
+def two(tmp_path_factory):
     """A replay of two policies, of which one has a name that would end a script."""
     out = tmp_path_factory.mktemp("pages") / "replay.html"
     scenario = Scenario.named("PreDC-v0")
     names = {"pre_dc": "pre_dc", "</script><b>nearest": "nearest2"}
     replay({label: make_policy(name, scenario) for label, name in names.items()}, scenario, 7, out)
-    browser.get(out.as_uri())
-    yield browser, data_of(out)
+    return out
+
+
+@pytest.fixture
+def opened(browser, two):
+    """That page in a browser, and its data."""
+    browser.get(two.as_uri())
+    yield browser, data_of(two)
     assert complaints(browser) == []
 
 
