@@ -30,7 +30,7 @@ MEMBERS = range(9)
 HYSTERESES = (0.2, 0.35, 0.5, 0.65, 0.8, 0.95)  # sensing radii
 SIZES = ((0, 1), (0, 2), (0, 4), (1, 3), (1, 5), (2, 4), (2, 6), (3, 5), (4, 6))  # few, many
 SPREADS = (0.08, 0.1, 0.13, 0.17, 0.22, 0.28, 0.36)  # sensing radii
-PRICES = tuple(float(price) for price in 0.075 * 2.0 ** np.arange(0, 8.0, 0.75))  # lam / worth [m/mJ]
+PRICE_STEP = 0.75  # octaves, from a quarter of the least lam to the largest
 SERVICES = (1.5, 2.0, 3.0, 5.0, 8.0)
 
 
@@ -126,8 +126,10 @@ def tune_adaptive(trials: Trials, order: str, hysteresis_m: dict[str, float]) ->
 
 
 def tune_greedy(trials: Trials) -> list[Terms]:
-    """Terms for each lam. Choices depend on lam / worth alone, so one play at that price serves all lams."""
-    tried = [(price, service) for price in PRICES for service in SERVICES]
+    """Terms for each lam. Choices depend on lam / worth [m/mJ] alone, so one play at that price serves all lams."""
+    least, most = trials.lams[[0, -1]]
+    prices = 0.25 * least * 2.0 ** np.arange(0.0, np.log2(4.0 * most / least) + 1e-9, PRICE_STEP)
+    tried = [(price, service) for price in prices.tolist() for service in SERVICES]
     policies = [Greedy(trials.scenario, (Terms(1.0, 1.0, service),)) for _, service in tried]
     best = trials.costs("greedy", policies, [price for price, _ in tried]).argmin(axis=0)
     lams = trials.lams.tolist()

@@ -290,7 +290,9 @@ def test_tuning_plays_each_policy_once_on_seeds_of_its_own(monkeypatch):
 
 
 def test_the_command_writes_the_table(monkeypatch, tmp_path):
-    for name, grid in dict(MEMBERS=(0, 2), HYSTERESES=(0.5,), SIZES=((0, 2),), SPREADS=(0.1,), PRICES=(1.0,)).items():
+    for name, grid in dict(
+        MEMBERS=(0, 2), HYSTERESES=(0.5,), SIZES=((0, 2),), SPREADS=(0.1,), PRICE_STEP=100.0
+    ).items():
         monkeypatch.setattr(tuning, name, grid)
     monkeypatch.setattr(tuning, "SERVICES", (3.0,))
     monkeypatch.setattr(tuning.Scenario, "named", lambda name: Scenario(name=name, periods=2))
