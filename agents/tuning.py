@@ -1,7 +1,8 @@
 """python -m agents.tuning: find the hand-written rules' parameters anew, on episodes that no comparison uses.
 
-Distances are tried as shares of the sensing radius. What is best for each lam goes to agents/tuned.json. Every policy
-that is tried plays once for all lams. Some minutes for each scenario.
+Name the lams that suit a scenario: `--scenario Binary-v0 --lams 0.833 1.67 3.33 6.67 13.3 26.7`. Distances are tried
+as shares of the sensing radius. What is best for each lam goes to agents/tuned.json. Every policy that is tried plays
+once for all lams. Some minutes for each scenario.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from wsn_env.world import World
 
 LAMS = [0.3, 0.5, 1.0, 2.0, 4.0, 8.0, 10.0, 16.0, 30.0]
 MEMBERS = range(9)
-HYSTERESES = (0.2, 0.35, 0.5, 0.65, 0.8, 0.95)  # sensing radii
+HYSTERESES = (0.0, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95)  # sensing radii
 SIZES = ((0, 1), (0, 2), (0, 4), (1, 3), (1, 5), (2, 4), (2, 6), (3, 5), (4, 6))  # few, many
 SPREADS = (0.08, 0.1, 0.13, 0.17, 0.22, 0.28, 0.36)  # sensing radii
 PRICE_STEP = 0.75  # octaves, from a quarter of the least lam to the largest

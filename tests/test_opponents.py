@@ -304,4 +304,4 @@ def test_the_command_writes_the_table(monkeypatch, tmp_path):
     mine = table["PreDC-v0"]
     assert mine["tuned_on"] == {"lams": [2.0, 4.0], "episodes": 2, "seed": 9000}
     assert mine["nearest"] == mine["information"] == {"0": 5.0, "2": 5.0}
-    assert mine["greedy"] == [[2.0, 2.0, 3.0], [4.0, 4.0, 3.0]]
+    assert mine["greedy"] == [[2.0, 4.0, 3.0], [4.0, 8.0, 3.0]]  # the least price is a quarter of the least lam
