@@ -152,7 +152,7 @@ def main() -> int:
         print(f"train.py: {problem}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print(f"train.py: stopped; --resume continues {settings.folder}", file=sys.stderr)
+        print(f"train.py: stopped; the same command with --resume continues {settings.folder}", file=sys.stderr)
         return 130
     return 0
 

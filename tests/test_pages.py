@@ -257,6 +257,8 @@ def test_hovering_shows_a_node(opened):
     ActionChains(browser).move_to_element_with_offset(canvas, x - size["width"] / 2, y - size["height"] / 2).perform()
     tip = browser.find_element("id", "tip")
     assert tip.is_displayed() and "battery" in tip.text and "last in 30" in tip.text
+    browser.execute_script("seek(0)")  # what it says goes with the time
+    assert tip.is_displayed() and "awake in 0 of 0 periods" in tip.text
     ActionChains(browser).move_to_element(browser.find_element("id", "play")).perform()
     assert not tip.is_displayed()
 

@@ -49,7 +49,7 @@ class Evaluation:
     @property
     def middle_lam(self) -> float:
         """The one that pictures are drawn at."""
-        return self.lams[len(self.lams) // 2]
+        return sorted(self.lams)[len(self.lams) // 2]
 
     @cached_property
     def _rows_of(self) -> dict[tuple[str, float], list[dict]]:

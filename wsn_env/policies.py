@@ -91,6 +91,8 @@ def _labelled(text: str, scenario: Scenario) -> tuple[str, Policy]:
     """("ppo", policy) from "ppo=runs/mine/policy.json"; a name or a path alone is its own label."""
     label, equals, source = text.partition("=")
     labelled = equals and ":" not in label  # else parameters: quadrants:n=2
+    if labelled and not label:
+        raise ValueError(f"policies: {text!r} has no label before the =")
     return (label, make_policy(source, scenario)) if labelled else (text, make_policy(text, scenario))
 
 

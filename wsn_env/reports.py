@@ -35,7 +35,7 @@ def about_the_bound(evaluation: Evaluation) -> str:
         return "no Cramer-Rao bound: a bit that jumps at an edge has no Fisher information"
     what = {
         "bound": "posterior Cramer-Rao bound of the reports delivered",
-        "reference": "the Cramer-Rao recursion of the reports delivered, which can be beaten here: no bound",
+        "reference": "Cramer-Rao recursion of the reports delivered, which can be beaten here: no bound",
     }[bound_kind(evaluation.scenario)]
     return f"RMS over the {what}; the same for all nodes awake and heard: {floor:.3f} m"
 
@@ -149,7 +149,7 @@ def draw_front(evaluation: Evaluation, lam: float, emphasis: str | None = None):
         axes.plot(*zip(*family), color=FAMILY, linewidth=1, label=plain(evaluation.family_name(stem)), zorder=1)
     draw_floor(axes, evaluation)
     energies = [energy.mean for energy, _ in points.values()]
-    if max(energies) > NARROW * min(energies):
+    if max(energies) > NARROW * min(energies) > 0:
         axes.set_xscale("log")
         plain_ticks(axes.xaxis)
     if emphasis is not None:

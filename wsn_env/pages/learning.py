@@ -18,6 +18,7 @@ CURVES = {  # of a training's progress.csv: the mean, its standard error, what i
 }
 STEPS = "time/total_timesteps"
 NORMAL_95 = 1.96
+FEW = 10  # points are drawn, too
 
 
 def learning_sections(folder: Path) -> list[str]:
@@ -54,12 +55,14 @@ def _draw_curves(steps, progress: dict[str, np.ndarray], names: Sequence[str]):
     for axes, name in zip(np.atleast_1d(figure.subplots(1, len(names))), names):
         error, what = CURVES[name]
         known = np.isfinite(progress[name])
-        axes.plot(steps[known], progress[name][known], color=BLUE, linewidth=1.5)
+        marker = "o" if known.sum() < FEW else None
+        axes.plot(steps[known], progress[name][known], color=BLUE, linewidth=1.5, marker=marker)
         if error in progress:
             half = NORMAL_95 * progress[error][known]
             ends = progress[name][known] - half, progress[name][known] + half
             axes.fill_between(steps[known], *ends, color=BLUE, alpha=0.25, linewidth=0)
         axes.set(xlabel="periods of training", ylabel=what)
         axes.xaxis.set_major_formatter(lambda value, _: f"{value / 1e6:g} M" if value >= 1e5 else f"{value:,.0f}")
+        axes.xaxis.get_major_locator().set_params(nbins=5)
         axes.grid(alpha=0.3)
     return figure

@@ -88,6 +88,7 @@ def _common(state: State, scenario: Scenario, seed: int) -> dict:
         "seed": seed,
         "lam": float(state.lam[0]),
         "period_s": scenario.period_s,
+        "unscored": scenario.unscored,
         "room_m": [width, depth],
         "unit_m": whole / FINE,
         "coarse_m": whole / COARSE,

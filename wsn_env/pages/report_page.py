@@ -67,7 +67,7 @@ def _comparison_sections(evaluation: Evaluation) -> list[str]:
     parts = [
         f"<p>{evaluation.episodes:,} paired episodes of each policy and lam: all meet the same fields, tracks,"
         f" detections and noises. Means with 95 % bootstrap intervals; <i>{html.escape(reference)} minus it</i> is the"
-        f" paired difference of returns. The column of the bound: {html.escape(about_the_bound(evaluation))}.</p>"
+        f" paired difference of returns. About the bound: {html.escape(about_the_bound(evaluation))}.</p>"
     ]
     for lam in evaluation.lams:
         rows = [table_header(evaluation, reference), *table_rows(evaluation, lam, reference)]
@@ -108,7 +108,7 @@ def settings_section(evaluation: Evaluation | None, training: dict | None = None
         }
         scenario = evaluation.scenario.as_dict()
         parts_of = {name: values for name, values in scenario.items() if isinstance(values, dict)}
-        whole = {name: value for name, value in scenario.items() if name not in parts_of}
+        whole = {name: value for name, value in scenario.items() if name not in (*parts_of, "lam")}
         parts = [values_table(facts)]
         parts += [folded(name, values_table(values)) for name, values in ({"scenario": whole} | parts_of).items()]
     if training:

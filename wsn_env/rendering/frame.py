@@ -189,14 +189,19 @@ def _write_head(canvas, plan, state, scenario, row, told, trail) -> None:
     rms = trail.rms_m(state, row)
     error = [("error ", f"{figure(told['error_m'])} m"), ("   rms ", "-" if np.isnan(rms) else f"{figure(rms)} m")]
     energy = [("energy ", joules(told["energy_mj"])), ("   so far ", joules(trail.energy_mj[row]))]
-    _write(canvas, edge, y, error, font)
-    width = sum(text_width(label + value, font) for label, value in energy)
-    _write(canvas, canvas.width - edge - width, y, energy, font)
+    taken = _write(canvas, edge, y, error, font)
+    for pairs in (energy, energy[:1]):
+        left = canvas.width - edge - sum(text_width(label + value, font) for label, value in pairs)
+        if left > taken + font // 2:
+            _write(canvas, left, y, pairs, font)
+            break
 
 
-def _write(canvas, x, y, pairs, font) -> None:
+def _write(canvas, x, y, pairs, font) -> int:
+    """Returns where they end."""
     for label, value in pairs:
         x = canvas.text(canvas.text(x, y, label, font, DIM), y, value, font, INK)
+    return x
 
 
 def _chip(canvas, plan, taken, right, y, words, colour, ink) -> int:

@@ -31,6 +31,8 @@ for (const episode of episodes) {
   episode.cluster = episode.frames.map((frame) => new Set(frame.head < 0 ? frame.members : [frame.head, ...frame.members]));
   episode.least = Math.min(...left) / data.battery_j;
 }
+const least = Math.min(...episodes.map((episode) => episode.least)); // the emptiest battery of all is the palest
+const short = (name) => (name.length > 30 ? `…${name.slice(-29)}` : name);
 
 // --- fields ---
 
@@ -115,7 +117,14 @@ function drawField(view) {
     pen.beginPath();
     pen.rect(x0, y0, data.room_m[0] * scale, data.room_m[1] * scale);
     pen.clip();
-    for (const node of cluster) disc(pen, place(nodes[node]), data.radius_m * scale, colour("--shade"));
+    pen.beginPath();
+    for (const node of cluster) {
+      const [x, y] = place(nodes[node]);
+      pen.moveTo(x, y);
+      pen.arc(x, y, data.radius_m * scale, 0, 2 * Math.PI);
+    }
+    pen.fillStyle = colour("--shade");
+    pen.fill();
     pen.restore();
   }
   pen.fillStyle = HUE.cloud + "90";
@@ -125,9 +134,12 @@ function drawField(view) {
   }
   const small = nodes.length > 400 ? 2 : 3;
   nodes.forEach((at, node) => {
-    const share = (left[node] / data.battery_j - episode.least) / Math.max(1 - episode.least, 1e-9);
-    pen.globalAlpha = left[node] > 0 ? 0.35 + 0.65 * share : 0.25;
-    disc(pen, place(at), small, left[node] > 0 ? colour("--soft") : null, colour("--soft"));
+    const share = least < 1 ? (left[node] / data.battery_j - least) / (1 - least) : 1;
+    pen.globalAlpha = left[node] > 0 ? 0.35 + 0.65 * share : 1;
+    if (left[node] > 0) return disc(pen, place(at), small, colour("--soft"));
+    const [x, y] = place(at);
+    line(pen, [[x - small, y - small], [x + small, y + small]], colour("--soft"), 1);
+    line(pen, [[x - small, y + small], [x + small, y - small]], colour("--soft"), 1);
   });
   pen.globalAlpha = 1;
   const mean = [frame.mean[0] * data.unit_m, frame.mean[1] * data.unit_m];
@@ -168,20 +180,24 @@ function hover(view, event) {
   view.hovered = best;
   const tip = element("tip");
   tip.hidden = best < 0;
+  tip.style.left = `${Math.min(event.clientX + 14, innerWidth - 270)}px`;
+  tip.style.top = `${event.clientY + 14}px`;
+  draw();
+}
+
+function tell(view) {
+  const best = view.hovered;
   if (best >= 0) {
     const { frames, cluster, left } = view.episode;
     const awake = (k) => cluster[k].has(best) || (frames[k].search && left[k - 1][best] > 0); // a search wakes all
     const periods = [...Array(period + 1).keys()].filter((k) => k > 0 && awake(k));
     const heard = frames.slice(1, period + 1).filter((f) => f.heard.includes(best)).length;
     const [x, y] = nodes[best];
-    tip.textContent = `node ${best} at (${x.toFixed(1)}, ${y.toFixed(1)}) m\n`
+    element("tip").textContent = `node ${best} at (${x.toFixed(1)}, ${y.toFixed(1)}) m\n`
       + `battery ${(100 * left[period][best] / data.battery_j).toFixed(3)} %\n`
       + `awake in ${periods.length} of ${period} periods${periods.length ? `, last in ${periods.at(-1)}` : ""}\n`
       + `reported in ${heard}`;
-    tip.style.left = `${Math.min(event.clientX + 14, innerWidth - 270)}px`;
-    tip.style.top = `${event.clientY + 14}px`;
   }
-  draw();
 }
 
 // --- curves ---
@@ -208,11 +224,12 @@ function drawCurve(id, title, unit, large) {
     line(pen, [[box.left, y], [box.right, y]], colour("--line"), 1);
     pen.fillText(figure(share * most), box.left - 5, y + 4);
   }
+  if (last === 1) values.forEach(([value], number) => disc(pen, at(1, value), 3, LINES[number]));
   values.forEach((series, number) => line(pen, series.map((value, k) => at(k + 1, value)), LINES[number], 1.5));
   line(pen, [[at(period, 0)[0], box.top], [at(period, 0)[0], box.bottom]], colour("--ink"), 1);
   let right = box.right;
   for (const number of [...episodes.keys()].reverse()) {
-    const name = episodes[number].policy;
+    const name = short(episodes[number].policy);
     pen.fillStyle = LINES[number];
     pen.fillText(name, right, 13);
     right -= pen.measureText(name).width + 12;
@@ -228,6 +245,7 @@ function drawCurve(id, title, unit, large) {
 
 function draw() {
   views.forEach(drawField);
+  views.forEach(tell);
   drawCurve("error", "error", "m");
   drawCurve("energy", "energy", "mJ", "J");
 }
@@ -275,15 +293,17 @@ element("last").onclick = () => seek(last);
 element("speed").onchange = () => faster(0);
 element("slider").max = last;
 element("slider").oninput = (event) => seek(Number(event.target.value));
-element("about").textContent = `lam = ${data.lam} m/mJ` + episodes.map((episode) =>
-  ` · ${episode.policy}: RMS ${episode.rms_m.toFixed(3)} m, ${joules(episode.energy_mj)} a period, return ${episode.total.toFixed(1)}`).join("");
+element("about").textContent = `lam = ${data.lam} m/mJ`
+  + (data.unscored ? ` · RMS without the first ${data.unscored} periods` : "") + episodes.map((episode) =>
+  ` · ${short(episode.policy)}: RMS ${episode.rms_m.toFixed(3)} m, ${joules(episode.energy_mj)} a period, return ${episode.total.toFixed(1)}`).join("");
 for (const [symbol, word] of data.legend) {
   const entry = document.createElement("span"), mark = document.createElement("i");
   mark.style[["heard", "target"].includes(symbol) ? "borderColor" : "background"] = HUE[symbol];
   entry.append(mark, word);
   element("legend").append(entry);
 }
-element("legend").append("cross: estimate; ellipse: 95 %; " + (data.radius_m ? "shade: sensing range; " : "") + "grey: asleep, fading with its battery");
+element("legend").append("cross: estimate; ellipse: 95 %; " + (data.radius_m ? "shade: sensing range; " : "") + "grey: asleep, the palest has the emptiest battery"
+  + (least <= 0 ? "; crossed out: dead" : ""));
 new ResizeObserver(draw).observe(document.body);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 seek(0);
