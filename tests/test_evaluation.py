@@ -196,7 +196,10 @@ def test_the_best_of_a_family_in_hindsight(tmp_path, capsys):
     names = ["pre_dc", "nearest0", "nearest3", "nearest8", "single7"]
     policies = {name: make_policy("nearest0" if name == "single7" else name, SCENARIO) for name in names}
     evaluation = evaluate(policies, SCENARIO, [0.3, 30.0], episodes=20)
-    assert evaluation.families() == ["nearest"]
+    assert evaluation.families() == ["nearest"] and evaluation.family_name("nearest") == "nearest0..8"
+    assert evaluation.middle_lam == 30.0 == evaluate(policies, SCENARIO, [30.0, 0.3], episodes=1).middle_lam
+    for lam in evaluation.lams:
+        assert evaluation.ranked(lam)[0] == max(names, key=lambda name: evaluation.values(name, lam, "return").mean())
     for lam in evaluation.lams:
         means = {name: evaluation.values(name, lam, "return").mean() for name in names[1:4]}
         assert evaluation.best_of("nearest", lam) == max(means, key=means.get)

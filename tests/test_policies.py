@@ -17,7 +17,7 @@ from wsn_env import Scenario, View, World, draws, evaluate, make_policy
 from wsn_env.cli import main
 from wsn_env.kept_blocks import BLOCKS_FILE
 from wsn_env.physics.sensing import detection_probability
-from wsn_env.policies import policy_names
+from wsn_env.policies import named_policies, policy_names
 from wsn_env.types import Cluster
 
 SCENARIO = Scenario.named("PreDC-v0", particles=200)
@@ -386,3 +386,8 @@ def test_what_was_not_compared_is_told():
     evaluation = evaluate(["nearest2", "all"], scenario, episodes=2)
     with pytest.raises(ValueError, match="'nearest3' at lam = 4.0: compared were nearest2, all at 4"):
         evaluation.difference("nearest3", "all", 4.0)
+
+
+def test_a_label_is_not_empty():
+    with pytest.raises(ValueError, match="'=pre_dc' has no label"):
+        named_policies(["=pre_dc"], Scenario.named("PreDC-v0"))
