@@ -23,33 +23,35 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecMonitor
+from wsn_env.agents.ppo import PPOPolicy, save_policy
 
-from agents.actor_critic import EntryPolicy, network_of
-from agents.fleet import Fleet
-from agents.levelling import LevelledRollout
-from agents.network import Network
-from agents.ppo import PPOPolicy, save_policy
-from agents.recipe import other_densities, suited_level, suited_order
-from agents.sb3 import SB3VecEnv
-from agents.training_reward import TrainingReward
 from wsn_env.cli import make_scenario
-from wsn_env.evaluation import evaluate
-from wsn_env.files import replacing
-from wsn_env.interface import Settings
-from wsn_env.interface.features import BELIEF_FEATURES, CANDIDATE_FEATURES
-from wsn_env.interface.prospects import ENTRY_FEATURES
-from wsn_env.kept_blocks import forget_blocks
-from wsn_env.pages.report_page import write_report
-from wsn_env.pictures import write_picture
-from wsn_env.policies import Policy, make_policy, policy_names
-from wsn_env.progress import progress_bar
-from wsn_env.quantity import check_quantity, parse_overrides
-from wsn_env.reports import draw_front, print_tables, save_markdown
-from wsn_env.rollout import FIRST_SEED, evaluation_seeds
+from wsn_env.envs.features import BELIEF_FEATURES, CANDIDATE_FEATURES
+from wsn_env.envs.interface import Settings
+from wsn_env.envs.prospects import ENTRY_FEATURES
+from wsn_env.envs.vector_env import ClusterVectorEnv
+from wsn_env.evaluation.comparison import evaluate
+from wsn_env.evaluation.files import replacing
+from wsn_env.evaluation.kept_blocks import forget_blocks
+from wsn_env.evaluation.policies import Policy, make_policy, policy_names
+from wsn_env.evaluation.progress import progress_bar
+from wsn_env.evaluation.rollout import FIRST_SEED, evaluation_seeds
+from wsn_env.evaluation.versions import versions
+from wsn_env.learning.actor_critic import EntryPolicy, network_of
+from wsn_env.learning.fleet import Fleet
+from wsn_env.learning.levelling import LevelledRollout
+from wsn_env.learning.network import Network
+from wsn_env.learning.recipe import other_densities, suited_level, suited_order
+from wsn_env.learning.sb3 import SB3VecEnv
+from wsn_env.learning.training_reward import TrainingReward
+from wsn_env.models.quantity import check_quantity, parse_overrides
+from wsn_env.reports.pages.report_page import write_report
+from wsn_env.reports.pictures import write_picture
+from wsn_env.reports.tables import draw_front, print_tables, save_markdown
 from wsn_env.scenario import Scenario
-from wsn_env.vector_env import ClusterVectorEnv
-from wsn_env.versions import versions
 
+SIZED = ("nearest", "informed")  # compared with each of SIZES
+SIZES = range(9)  # further members
 SLOW = ("ppo", "planner")  # left out of the comparison: the one trained is in it, the other takes hours
 
 
@@ -228,7 +230,7 @@ def learn_here(settings: Training, scenario: Scenario, speaks: Settings, folder:
 def learn_on_ray(settings: Training, scenario: Scenario, speaks: Settings, folder: Path) -> Network:
     """RLlib's PPO."""
     try:
-        from agents.rllib import RayTraining
+        from wsn_env.learning.rllib import RayTraining
     except ImportError as problem:
         raise ValueError(f"engine 'ray': pip install 'wsn_env[ray]' ({problem})") from None
 
@@ -412,10 +414,10 @@ def mean_and_error(values) -> tuple[float, float]:
 def opponents(scenario: Scenario) -> dict[str, Policy]:
     """Every installed policy by name; one that cannot be made is left out, and said."""
     made = {}
-    for name in policy_names():
+    names = [name for name in policy_names() if name not in (*SLOW, *SIZED)]
+    for name in sorted(names + [f"{name}{size}" for name in SIZED for size in SIZES]):
         try:
-            if name not in SLOW:
-                made[name] = make_policy(name, scenario)
+            made[name] = make_policy(name, scenario)
         except ValueError as problem:
             print(f"train.py: left out of the comparison: {problem}", file=sys.stderr)
     return made

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wsn_env.physics.sensing import detection_probability
+from wsn_env.models.physics.sensing import detection_probability
 from wsn_env.scenario import Scenario
-from wsn_env.types import KEEP_CLUSTER, Cluster
-from wsn_env.view import View
+from wsn_env.simulation.state import KEEP_CLUSTER, Cluster
+from wsn_env.simulation.view import View
 
 
 @dataclass(frozen=True)

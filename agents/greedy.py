@@ -7,18 +7,18 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from wsn_env.agents.base import ViewPolicy
+from wsn_env.agents.tuned import nearest_lam, tuned
 
-from agents.base import ViewPolicy
-from agents.tuned import nearest_lam, tuned
-from wsn_env.compiling import kernel, piece
-from wsn_env.interface.merit import chance, gain, price_mj
-from wsn_env.physics.constants import constants
-from wsn_env.physics.field import squared_distance
-from wsn_env.physics.radio import TO_HEAD, in_one_hop, relayed, transmission
-from wsn_env.physics.sensing import BINARY
-from wsn_env.quantity import check_quantity
-from wsn_env.types import Cluster, Sensors
-from wsn_env.view import View
+from wsn_env.compiled.kernels import kernel, piece
+from wsn_env.envs.merit import chance, gain, price_mj
+from wsn_env.models.physics.constants import constants
+from wsn_env.models.physics.field import squared_distance
+from wsn_env.models.physics.radio import TO_HEAD, in_one_hop, relayed, transmission
+from wsn_env.models.physics.sensing import BINARY
+from wsn_env.models.quantity import check_quantity
+from wsn_env.simulation.state import Cluster, Sensors
+from wsn_env.simulation.view import View
 
 CANDIDATES = 12
 LEAST_DETECTION = 1e-6  # down to it `gain` tells probabilities apart

@@ -7,17 +7,17 @@ from __future__ import annotations
 
 from numba import uint64
 
-from wsn_env import draws
-from wsn_env.compiling import kernel, lean_piece, piece
-from wsn_env.physics.constants import constants
-from wsn_env.physics.motion import advance
-from wsn_env.physics.sensing import POSITION, strength, strength_slope
+from wsn_env.compiled import draws
+from wsn_env.compiled.kernels import kernel, lean_piece, piece
+from wsn_env.filters.kernels import redraw_row
+from wsn_env.filters.resampling import correlated, lower_root
+from wsn_env.models.physics.constants import constants
+from wsn_env.models.physics.motion import advance
+from wsn_env.models.physics.sensing import POSITION, strength, strength_slope
 from wsn_env.scenario import Scenario
-from wsn_env.trackers.kernels import redraw_row
-from wsn_env.trackers.resampling import correlated, lower_root
-from wsn_env.types import Belief, Network, Reports, State, network_of, state_of
-from wsn_env.view import View
-from wsn_env.world import World
+from wsn_env.simulation.state import Belief, Network, Reports, State, network_of, state_of
+from wsn_env.simulation.view import View
+from wsn_env.simulation.world import World
 
 
 def imagined_world(scenario: Scenario, periods: int, particles: int) -> World:

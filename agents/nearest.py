@@ -6,16 +6,16 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from wsn_env.agents.base import ViewPolicy
+from wsn_env.agents.tuned import tuned
 
-from agents.base import ViewPolicy
-from agents.tuned import tuned
-from wsn_env.interface.merit import order_by_merit
-from wsn_env.physics.constants import constants
-from wsn_env.physics.field import distances_to
-from wsn_env.quantity import check_quantity, suggest
+from wsn_env.envs.merit import order_by_merit
+from wsn_env.models.physics.constants import constants
+from wsn_env.models.physics.field import distances_to
+from wsn_env.models.quantity import check_quantity, suggest
 from wsn_env.scenario import Scenario
-from wsn_env.types import Cluster
-from wsn_env.view import View
+from wsn_env.simulation.state import Cluster
+from wsn_env.simulation.view import View
 
 ORDERS = ("nearest", "information")
 CANDIDATES = 12  # nearest living nodes that the information order chooses from
@@ -24,8 +24,8 @@ RADII = 0.8  # hysteresis in sensing radii where none was tuned
 
 @dataclass(frozen=True)
 class Nearest(ViewPolicy):
-    """The head and the n best further members: the living nodes nearest to the prediction (nearest0 .. nearest8), or
-    first in the greedy order of information (informed0 .. informed8), each next one the best beside those before it.
+    """The head and the n best further members: the living nodes nearest to the prediction ("nearest3"), or first in
+    the greedy order of information ("informed3"), each next one the best beside those before it.
 
     The head stays while the prediction is within `hysteresis_m` of it; then the best node of the order leads.
     """
@@ -87,9 +87,4 @@ def usual_hysteresis_m(scenario: Scenario) -> float:
     return 0.0 if free else RADII * scenario.radius_m
 
 
-nearest0, nearest1, nearest2, nearest3, nearest4, nearest5, nearest6, nearest7, nearest8 = (
-    partial(Nearest, n=n) for n in range(9)
-)
-informed0, informed1, informed2, informed3, informed4, informed5, informed6, informed7, informed8 = (
-    partial(Nearest, n=n, order="information") for n in range(9)
-)
+informed = partial(Nearest, order="information")

@@ -1,7 +1,7 @@
 """A policy that looks ahead: it plays its choices in worlds drawn from the belief, and takes what comes cheapest.
 
-`python -m agents.planner --scenario Rssi-v0 --episodes 200` compares it with the fixed clusters and prints what a
-decision costs.
+`python -m wsn_env.agents.planner --scenario Rssi-v0 --episodes 200` compares it with the fixed clusters and prints what
+a decision costs.
 """
 
 from __future__ import annotations
@@ -12,22 +12,22 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from wsn_env.agents.base import ViewPolicy
+from wsn_env.agents.imagined import draw_worlds, imagined_world, place_nodes, rows_of
+from wsn_env.agents.nearest import Nearest
 
-from agents.base import ViewPolicy
-from agents.imagined import draw_worlds, imagined_world, place_nodes, rows_of
-from agents.nearest import Nearest
-from wsn_env.evaluation import evaluate
-from wsn_env.interface.actions import MENU_MEMBERS, MenuAction
-from wsn_env.interface.rewards import belief_cost
-from wsn_env.policies import Policy, make_policy
-from wsn_env.progress import progress_bar
-from wsn_env.quantity import check_quantity
-from wsn_env.rollout import rollout
+from wsn_env.envs.actions import MENU_MEMBERS, MenuAction
+from wsn_env.envs.rewards import belief_cost
+from wsn_env.evaluation.comparison import evaluate
+from wsn_env.evaluation.policies import Policy, make_policy
+from wsn_env.evaluation.progress import progress_bar
+from wsn_env.evaluation.rollout import rollout
+from wsn_env.models.quantity import check_quantity
+from wsn_env.models.sections import Binary, Position
 from wsn_env.scenario import Scenario
-from wsn_env.sections import Binary, Position
-from wsn_env.types import Cluster, State
-from wsn_env.view import View
-from wsn_env.world import World
+from wsn_env.simulation.state import Cluster, State
+from wsn_env.simulation.view import View
+from wsn_env.simulation.world import World
 
 ROWS = 320  # worlds played side by side: some 16 for each choice at first
 CANDIDATES = 12
@@ -212,7 +212,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Compare and print."""
     import tyro
 
-    from wsn_env.reports import print_tables
+    from wsn_env.reports.tables import print_tables
 
     settings = tyro.cli(Comparison, args=arguments)
     scenario = Scenario.named(settings.scenario, **({} if settings.lam is None else {"lam": settings.lam}))

@@ -13,13 +13,13 @@ from pathlib import Path
 
 import numpy as np
 from gymnasium.spaces import Discrete
+from wsn_env.agents.base import ViewPolicy
 
-from agents.base import ViewPolicy
-from agents.network import Network
-from wsn_env.files import replacing
-from wsn_env.interface import Interface, Settings
-from wsn_env.types import Cluster
-from wsn_env.view import View
+from wsn_env.envs.interface import Interface, Settings
+from wsn_env.evaluation.files import replacing
+from wsn_env.learning.network import Network
+from wsn_env.simulation.state import Cluster
+from wsn_env.simulation.view import View
 
 PRETRAINED = Path(__file__).parent / "pretrained"
 SPOKEN = (("menu", "menu"), ("menu", "candidates"), ("subset", "candidates"))

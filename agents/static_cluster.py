@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agents.base import ViewPolicy
-from wsn_env.types import Cluster
-from wsn_env.view import View
+from wsn_env.agents.base import ViewPolicy
+
+from wsn_env.simulation.state import Cluster
+from wsn_env.simulation.view import View
 
 
 @dataclass(frozen=True)

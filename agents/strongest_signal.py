@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from wsn_env.agents.base import ViewPolicy
 
-from agents.base import ViewPolicy
-from wsn_env.physics.field import distances_to
-from wsn_env.quantity import check_quantity
-from wsn_env.sections import Level, Position
-from wsn_env.types import Cluster
-from wsn_env.view import View
+from wsn_env.models.physics.field import distances_to
+from wsn_env.models.quantity import check_quantity
+from wsn_env.models.sections import Level, Position
+from wsn_env.simulation.state import Cluster
+from wsn_env.simulation.view import View
 
 
 @dataclass(frozen=True)

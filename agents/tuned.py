@@ -1,4 +1,4 @@
-"""Parameters of hand-written rules, tuned on episodes that nothing else meets; `python -m agents.tuning` makes them."""
+"""Parameters of hand-written rules, tuned on episodes that nothing else meets (`python -m wsn_env.learning.tuning`)."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from benchmarks.filters.agreement import STRICT, check
 from benchmarks.filters.book import BookFilter
 from benchmarks.naive import NaiveEnv
 from benchmarks.race import Claim, Options, Result, Table, Times, figure, interleave, main
-from wsn_env.quantity import ScenarioError
+from wsn_env.models.quantity import ScenarioError
 from wsn_env.scenario import Scenario
 
 ID = "wsn_env/PreDC-v0"

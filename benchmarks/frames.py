@@ -11,10 +11,11 @@ from PIL import Image, ImageDraw
 from rich.console import Console
 
 from benchmarks.race import Claim, Options, Result, Table, figure, interleave, main
-from wsn_env import Scenario, View, World, draws, make_policy
-from wsn_env.rendering.camera import Camera
-from wsn_env.rendering.palette import BLUE, FULL, GREEN, INK, ORANGE, PAPER, SKY, VERMILION
-from wsn_env.rendering.plan import SIZE
+from wsn_env import Scenario, View, World, make_policy
+from wsn_env.compiled import draws
+from wsn_env.envs.rendering.camera import Camera
+from wsn_env.envs.rendering.palette import BLUE, FULL, GREEN, INK, ORANGE, PAPER, SKY, VERMILION
+from wsn_env.envs.rendering.plan import SIZE
 
 PERIODS = 60  # of the tails
 AT_LEAST_FPS = 500.0

@@ -17,10 +17,10 @@ import numpy as np
 from rich.console import Console
 
 from benchmarks.race import Claim, Options, Result, Table, figure, main
+from wsn_env.filters.kernels import scratch
 from wsn_env.scenario import Scenario
-from wsn_env.trackers.kernels import scratch
-from wsn_env.types import Cluster, State
-from wsn_env.world import World
+from wsn_env.simulation.state import Cluster, State
+from wsn_env.simulation.world import World
 
 ID = "wsn_env/PreDC-v0"
 SIZES = ((5000, 225), (500, 225), (5000, 10_000))  # particles, nodes

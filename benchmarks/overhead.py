@@ -19,10 +19,10 @@ from rich.console import Console
 from benchmarks.race import Claim, Options, Result, Table, Times, figure, interleave, main
 from benchmarks.stopwatch import Stopwatch
 from benchmarks.vector import ID, MENU_ENTRY, ROWS
-from wsn_env.trackers.particle import ParticleTracker
-from wsn_env.types import Belief, Network, Reports
-from wsn_env.vector_env import ClusterVectorEnv
-from wsn_env.view import View
+from wsn_env.envs.vector_env import ClusterVectorEnv
+from wsn_env.filters.particle import ParticleTracker
+from wsn_env.simulation.state import Belief, Network, Reports
+from wsn_env.simulation.view import View
 
 SEED = 0
 SHORT = {"periods": 30}

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from benchmarks.plots import draw
 from benchmarks.race import Claim, Plot, Result, Table
-from wsn_env.files import replacing
+from wsn_env.evaluation.files import replacing
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "performance.md"

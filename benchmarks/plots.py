@@ -6,8 +6,8 @@ import math
 from pathlib import Path
 
 from benchmarks.race import Plot
-from wsn_env.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
-from wsn_env.files import replacing
+from wsn_env.envs.rendering.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
+from wsn_env.evaluation.files import replacing
 
 OURS = {"wsn_env, strict": VERMILION, "wsn_env, fast": ORANGE}
 COLOURS = (BLUE, GREEN, PURPLE, SKY, BLACK)  # of the others, with another dash in every turn; yellow is too pale

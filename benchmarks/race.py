@@ -23,7 +23,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table as RichTable
 
-from wsn_env.files import replacing
+from wsn_env.evaluation.files import replacing
 
 ROUNDS, TURN_S = 15, 0.05
 SHORT_ROUNDS, SHORT_TURN_S = 3, 0.004

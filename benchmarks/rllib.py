@@ -51,7 +51,7 @@ def sampler(name: str, rows: int) -> Callable[[], object]:
     from ray.rllib.core.rl_module.default_model_config import DefaultModelConfig
     from ray.rllib.env.single_agent_env_runner import SingleAgentEnvRunner
 
-    from agents.native_runner import NativeRunner
+    from wsn_env.learning.native_runner import NativeRunner
 
     torch.set_num_threads(1)
     settings = {"lam": 4.0} | ({"autoreset_mode": "Disabled"} if name == NATIVE else {})

@@ -19,7 +19,7 @@ import numpy as np
 from rich.console import Console
 
 from benchmarks.race import Claim, Options, Result, Table, figure, main
-from wsn_env.vector_env import ClusterVectorEnv
+from wsn_env.envs.vector_env import ClusterVectorEnv
 
 AT_MOST = 35.0  # %
 RUNS = 5  # at most
@@ -88,7 +88,7 @@ def child(arguments: list[str]) -> None:
     from stable_baselines3.common.policies import ActorCriticPolicy
 
     import train
-    from agents.sb3 import SB3VecEnv
+    from wsn_env.learning.sb3 import SB3VecEnv
 
     settings = tyro.cli(train.Training, args=arguments)
     if settings.steps == train.Training.steps:

@@ -17,7 +17,7 @@ import numpy as np
 from rich.console import Console
 
 from benchmarks.race import Claim, Options, Plot, Result, Table, Times, figure, interleave, main
-from wsn_env.compiling import available_threads
+from wsn_env.compiled.kernels import available_threads
 from wsn_env.scenario import Scenario
 
 ID = "wsn_env/PreDC-v0"

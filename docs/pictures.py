@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from wsn_env import Scenario, View, World, draws, make_policy
-from wsn_env.registration import IDS
-from wsn_env.rendering.camera import Camera
-from wsn_env.rendering.palette import BLUE, FLASH, FULL, GREEN, INK, ORANGE, PURPLE, SENSED, SKY, VERMILION, YELLOW
-from wsn_env.rendering.plan import SIZE
+from wsn_env import Scenario, View, World, make_policy
+from wsn_env.compiled import draws
+from wsn_env.envs.registration import IDS
+from wsn_env.envs.rendering.camera import Camera
+from wsn_env.envs.rendering.palette import BLUE, FLASH, FULL, GREEN, INK, ORANGE, PURPLE, SENSED, SKY, VERMILION, YELLOW
+from wsn_env.envs.rendering.plan import SIZE
 
 SEED, PERIODS = 7, 25
 POLICIES = (  # where a policy is at home

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import tyro
 
-from wsn_env.bluetooth.dataset import DatasetError, Track, read_dataset
+from wsn_env.models.recordings.dataset import DatasetError, Track, read_dataset
 
 
 @dataclass

@@ -13,7 +13,7 @@ from closing import ENV, FIELD, Example
 from torch import nn
 from torch.distributions import Categorical
 
-from agents.training_reward import TrainingReward
+from wsn_env.learning.training_reward import TrainingReward
 
 GAMMA, LAMBDA, CLIP, EPOCHS, BATCH = 0.95, 0.9, 0.2, 10, 256
 

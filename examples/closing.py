@@ -10,7 +10,7 @@ import gymnasium as gym
 import torch
 
 from wsn_env import score
-from wsn_env.intervals import Summary
+from wsn_env.evaluation.intervals import Summary
 
 ENV = "wsn_env/PreDC-v0"  # "wsn_env:wsn_env/PreDC-v0" where a process of a toolkit's own makes it
 FIELD = dict(lam=4.0, observation="menu", reward="belief")  # of lower variance; scores are of the true error

@@ -12,9 +12,9 @@ import tyro
 from closing import ENV, FIELD, Example
 from stable_baselines3 import PPO
 
-from agents.sb3 import SB3VecEnv
-from agents.training_reward import TrainingReward
 from wsn_env import score
+from wsn_env.learning.sb3 import SB3VecEnv
+from wsn_env.learning.training_reward import TrainingReward
 
 SEARCH_SEED = 1  # its held-out episodes are others than those of the closing line
 

@@ -15,7 +15,7 @@ from closing import ENV, FIELD, Example
 from ray.rllib.algorithms.ppo import PPOConfig
 from ray.rllib.core.rl_module.default_model_config import DefaultModelConfig
 
-from agents.native_runner import NativeRunner
+from wsn_env.learning.native_runner import NativeRunner
 
 
 def main(steps: int = 20_000, rows: int = 64, runners: int = 0, seed: int | None = 0) -> None:

@@ -13,8 +13,8 @@ import tyro
 from closing import ENV, FIELD, Example
 from stable_baselines3 import PPO
 
-from agents.sb3 import SB3VecEnv
-from agents.training_reward import TrainingReward
+from wsn_env.learning.sb3 import SB3VecEnv
+from wsn_env.learning.training_reward import TrainingReward
 
 
 def main(steps: int = 20_000, rows: int = 64, seed: int = 0) -> None:

@@ -17,7 +17,7 @@ from skrl.trainers.torch import SequentialTrainer
 from skrl.utils import set_seed
 from skrl.utils.model_instantiators.torch import categorical_model, deterministic_model
 
-from agents.training_reward import TrainingReward
+from wsn_env.learning.training_reward import TrainingReward
 
 LAYERS = [{"name": "net", "input": "OBSERVATIONS", "layers": [64, 64], "activations": "tanh"}]
 

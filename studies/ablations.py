@@ -18,14 +18,14 @@ from pathlib import Path
 
 import numpy as np
 import tyro
+from wsn_env.agents.ppo import PPOPolicy
 
-from agents.ppo import PPOPolicy
-from agents.recipe import suited_level, suited_order
 from studies.report import draw_curves, save_table
 from wsn_env.cli import make_scenario
-from wsn_env.evaluation import evaluate
-from wsn_env.interface.merit import ORDERS
-from wsn_env.progress import progress_bar
+from wsn_env.envs.merit import ORDERS
+from wsn_env.evaluation.comparison import evaluate
+from wsn_env.evaluation.progress import progress_bar
+from wsn_env.learning.recipe import suited_level, suited_order
 from wsn_env.scenario import Scenario
 
 USUAL = "usual"

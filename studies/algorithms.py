@@ -18,14 +18,14 @@ import numpy as np
 import torch
 import tyro
 
-from agents.recipe import suited_order
-from agents.sb3 import SB3VecEnv
-from agents.training_reward import TrainingReward
 from studies.report import save_table
 from wsn_env.cli import make_scenario
+from wsn_env.envs.vector_env import ClusterVectorEnv
+from wsn_env.evaluation.scoring import score
+from wsn_env.learning.recipe import suited_order
+from wsn_env.learning.sb3 import SB3VecEnv
+from wsn_env.learning.training_reward import TrainingReward
 from wsn_env.scenario import Scenario
-from wsn_env.scoring import score
-from wsn_env.vector_env import ClusterVectorEnv
 
 ROWS = 256
 

@@ -17,21 +17,21 @@ import tyro
 
 from train import Training, train
 from wsn_env.bluetooth.calibration import leave_one_out
-from wsn_env.bluetooth.dataset import read_dataset
-from wsn_env.colours import BLUE, DARK, SKY, VERMILION
-from wsn_env.files import replacing
-from wsn_env.policies import make_policy
-from wsn_env.progress import progress_bar
-from wsn_env.recorded_evaluation import (
+from wsn_env.bluetooth.recorded_evaluation import (
     RecordedEvaluation,
     evaluate_recorded,
     forget_recorded_blocks,
     print_recorded,
     save_recorded,
 )
-from wsn_env.rollout import episodes
+from wsn_env.envs.rendering.colours import BLUE, DARK, SKY, VERMILION
+from wsn_env.evaluation.files import replacing
+from wsn_env.evaluation.policies import make_policy
+from wsn_env.evaluation.progress import progress_bar
+from wsn_env.evaluation.rollout import episodes
+from wsn_env.models.recordings.dataset import read_dataset
 from wsn_env.scenario import Scenario
-from wsn_env.world import World
+from wsn_env.simulation.world import World
 
 MEMBERS = (1, 2, 3, 5)  # further ones: 2, 3, 4 and 6 of the receivers listen
 RULES = (

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from scipy import stats
 
-from wsn_env.colours import LINES
-from wsn_env.files import replacing
+from wsn_env.envs.rendering.colours import LINES
+from wsn_env.evaluation.files import replacing
 
 CURVE = "time/total_timesteps", "rollout/ep_rew_mean", "rollout/ep_len_mean"
 WORSE = 1.35  # the picture's lowest reward over its highest

@@ -14,16 +14,16 @@ from pathlib import Path
 
 import numpy as np
 import tyro
+from wsn_env.agents.ppo import PPOPolicy
 
-from agents.ppo import PPOPolicy
 from wsn_env.cli import make_scenario
-from wsn_env.evaluation import Evaluation, evaluate
-from wsn_env.files import replacing
-from wsn_env.front import hypervolumes, joined, numbered, points_of, reference_point
-from wsn_env.intervals import Summary
-from wsn_env.kept_blocks import forget_blocks
-from wsn_env.policies import make_policy, policy_names
-from wsn_env.progress import progress_bar
+from wsn_env.evaluation.comparison import Evaluation, evaluate
+from wsn_env.evaluation.files import replacing
+from wsn_env.evaluation.front import hypervolumes, joined, numbered, points_of, reference_point
+from wsn_env.evaluation.intervals import Summary
+from wsn_env.evaluation.kept_blocks import forget_blocks
+from wsn_env.evaluation.policies import make_policy, policy_names
+from wsn_env.evaluation.progress import progress_bar
 from wsn_env.scenario import Scenario
 
 SLOW = ("ppo", "planner", "all")

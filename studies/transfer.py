@@ -16,11 +16,11 @@ import tyro
 
 from studies.seeds import ahead_of, best_of, load, returns
 from wsn_env.cli import make_scenario
-from wsn_env.evaluation import Evaluation, evaluate
-from wsn_env.files import replacing
-from wsn_env.kept_blocks import forget_blocks
-from wsn_env.policies import make_policy
-from wsn_env.progress import progress_bar
+from wsn_env.evaluation.comparison import Evaluation, evaluate
+from wsn_env.evaluation.files import replacing
+from wsn_env.evaluation.kept_blocks import forget_blocks
+from wsn_env.evaluation.policies import make_policy
+from wsn_env.evaluation.progress import progress_bar
 from wsn_env.scenario import Scenario
 
 SIZES = [f"nearest{size}" for size in range(9)]

@@ -5,10 +5,10 @@ import pytest
 
 from tests.worlds import keys_of
 from wsn_env import Cluster, Scenario, View, World, make_policy
-from wsn_env.env import ClusterEnv
-from wsn_env.quantity import ScenarioError
-from wsn_env.sections import Beacon
-from wsn_env.types import NOBODY, SILENT_DB
+from wsn_env.envs.env import ClusterEnv
+from wsn_env.models.quantity import ScenarioError
+from wsn_env.models.sections import Beacon
+from wsn_env.simulation.state import NOBODY, SILENT_DB
 
 QUIET = dict(field_db=0.0, drift_db=0.0, main_db=0.0, main_sd_db=0.0, fade_share=0.0, loss=0.0, loss_after_loss=0.0)
 STILL = dict(motion="legs", start_m=(9.0, 8.0), legs=((1.0, 1e-9, 1e-9),))
@@ -306,7 +306,7 @@ def test_a_room_may_be_deeper_than_wide():
 
 def test_a_calibration_must_be_whole(tmp_path):
     from wsn_env.bluetooth.calibration import QUANTITIES
-    from wsn_env.bluetooth.replay import CALIBRATED
+    from wsn_env.models.recordings.replay import CALIBRATED
 
     assert set(CALIBRATED) == set(QUANTITIES)
     (tmp_path / "c.json").write_text('{"quantities": {"positions": [[1, 2]], "loss": 0.1}}')

@@ -8,7 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wsn_env.bluetooth.dataset import (
+from wsn_env.bluetooth.synthetic import (
+    BEACON,
+    BEACON_M,
+    INTERVAL_S,
+    LOSS,
+    NAMES,
+    ROOM_M,
+    receiver_positions,
+    write_dataset,
+)
+from wsn_env.models.quantity import ScenarioError
+from wsn_env.models.recordings.dataset import (
     ASTRAY_S,
     GAP_S,
     REASONS,
@@ -20,17 +31,6 @@ from wsn_env.bluetooth.dataset import (
     read_track,
     track_files,
 )
-from wsn_env.bluetooth.synthetic import (
-    BEACON,
-    BEACON_M,
-    INTERVAL_S,
-    LOSS,
-    NAMES,
-    ROOM_M,
-    receiver_positions,
-    write_dataset,
-)
-from wsn_env.quantity import ScenarioError
 
 FOLDER = os.environ.get("WSN_BLE_DIR")
 ROOT = Path(__file__).parents[1]

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from wsn_env import Cluster, Scenario, World
+from wsn_env.filters.least_squares import circle_centre, scalar_update
 from wsn_env.papers.binary.readings import solve_pairs
-from wsn_env.sections import BOUNDARY_TRACKERS
-from wsn_env.trackers.least_squares import circle_centre, scalar_update
+from wsn_env.scenario.tracking import BOUNDARY_TRACKERS
 
 T, R = 1.0, 60.0
 F = np.array([[1, T, 0, 0], [0, 1, 0, 0], [0, 0, 1, T], [0, 0, 0, 1.0]])

@@ -9,13 +9,14 @@ import pytest
 
 from tests.test_env import same
 from tests.worlds import choices, keys_of
-from wsn_env import ClusterEnv, ClusterVectorEnv, Scenario, World, bounds, make_policy
-from wsn_env.bounds import Bound, bound_kind
-from wsn_env.evaluation import evaluate
-from wsn_env.intervals import Summary
-from wsn_env.pictures import write_picture
-from wsn_env.reports import draw_front, markdown_table, print_tables
-from wsn_env.rollout import episodes, evaluation_seeds, rollout
+from wsn_env import ClusterEnv, ClusterVectorEnv, Scenario, World, make_policy
+from wsn_env.evaluation.comparison import evaluate
+from wsn_env.evaluation.intervals import Summary
+from wsn_env.evaluation.rollout import episodes, evaluation_seeds, rollout
+from wsn_env.reports.pictures import write_picture
+from wsn_env.reports.tables import draw_front, markdown_table, print_tables
+from wsn_env.simulation import bound as bounds
+from wsn_env.simulation.bound import Bound, bound_kind
 
 PLAIN = dict(particles=50)
 

@@ -24,10 +24,10 @@ from wsn_env.bluetooth.calibration import (
     measure_losses,
     residuals,
 )
-from wsn_env.bluetooth.dataset import Receivers, Track, read_dataset
-from wsn_env.bluetooth.replay import load_map
 from wsn_env.bluetooth.residual_map import CELL_M, residual_map, save_map
-from wsn_env.quantity import ScenarioError
+from wsn_env.models.quantity import ScenarioError
+from wsn_env.models.recordings.dataset import Receivers, Track, read_dataset
+from wsn_env.models.recordings.replay import load_map
 
 RECORDED = os.environ.get("WSN_BLE_DIR")
 ROOM = Receivers(

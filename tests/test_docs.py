@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from wsn_env.cli import main
-from wsn_env.policies import policy_names
-from wsn_env.registration import IDS
+from wsn_env.envs.registration import IDS
+from wsn_env.evaluation.policies import policy_names
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]

@@ -8,7 +8,7 @@ from numba import uint64
 from scipy import stats
 
 import wsn_env  # noqa: F401 (registers the environments)
-from wsn_env import draws
+from wsn_env.compiled import draws
 
 N = 400_000
 SIGNIFICANT = 1e-4  # p value below which a fixed-seed test of a distribution fails

@@ -15,7 +15,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import wsn_env
 from wsn_env import ClusterEnv, ClusterVectorEnv, Scenario, ScenarioError
-from wsn_env.registration import IDS
+from wsn_env.envs.registration import IDS
 
 ACTIONS = ("menu", "subset", "nodes", "cluster")
 OBSERVATIONS = ("candidates", "dict", "view")

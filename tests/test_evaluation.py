@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from wsn_env import Scenario, View, make_policy
-from wsn_env.evaluation import COLUMNS, Evaluation, evaluate
-from wsn_env.intervals import Summary
-from wsn_env.pictures import write_picture
-from wsn_env.reports import draw_front, markdown_table, print_tables, save_markdown
-from wsn_env.rollout import BLOCK, evaluation_seeds
+from wsn_env.evaluation.comparison import COLUMNS, Evaluation, evaluate
+from wsn_env.evaluation.intervals import Summary
+from wsn_env.evaluation.rollout import BLOCK, evaluation_seeds
+from wsn_env.reports.pictures import write_picture
+from wsn_env.reports.tables import draw_front, markdown_table, print_tables, save_markdown
 
 SCENARIO = Scenario.named("PreDC-v0", particles=60, nodes=40, side_m=50.0, crossing_m=20.0, periods=8)
 
@@ -107,7 +107,7 @@ def test_a_stopped_run_continues_where_it_was(tmp_path, monkeypatch):
     with open(blocks, "a") as file:
         file.write('["nearest1", 1.0, 1, [{"lam": 1.0, "peri')  # as kill -9 leaves it
     played = []
-    import wsn_env.rollout as module
+    import wsn_env.evaluation.rollout as module
 
     rollout = module.rollout
     monkeypatch.setattr(module, "rollout", lambda *a: played.append(1) or rollout(*a))
@@ -164,7 +164,7 @@ def test_damaged_blocks_are_played_again(tmp_path):
 
 
 def test_a_policy_blind_to_lam_plays_once_and_its_rows_are_those_of_a_replay(tmp_path, monkeypatch):
-    import wsn_env.rollout as module
+    import wsn_env.evaluation.rollout as module
 
     class Watched:
         """Says nothing of lam, so that it is played at each."""

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wsn_env import Scenario, ScenarioError, World
-from wsn_env.physics.field import index, nearest
-from wsn_env.types import State
+from wsn_env.models.physics.field import index, nearest
+from wsn_env.simulation.state import State
 
 
 def network_of(positions, battery=None):

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from wsn_env.agents.base import ViewPolicy
+from wsn_env.agents.nearest import Nearest
 
-from agents.base import ViewPolicy
-from agents.nearest import Nearest
 from wsn_env import Scenario, ScenarioError, make_policy
 from wsn_env.cli import main
-from wsn_env.evaluation import evaluate
-from wsn_env.front import (
+from wsn_env.evaluation.comparison import evaluate
+from wsn_env.evaluation.front import (
     OTHERS,
     Point,
     fronts,
@@ -25,9 +25,9 @@ from wsn_env.front import (
     reference_point,
     save_front,
 )
-from wsn_env.front_report import draw_fronts
-from wsn_env.intervals import Summary
-from wsn_env.pictures import write_picture
+from wsn_env.evaluation.intervals import Summary
+from wsn_env.reports.front import draw_fronts
+from wsn_env.reports.pictures import write_picture
 from wsn_env.scenario import PRESETS
 
 SMALL = dict(particles=50, nodes=40, side_m=50.0, crossing_m=20.0, periods=6)
@@ -186,6 +186,6 @@ def test_pareto_prints_tables_and_writes_files(tmp_path, capsys):
 
 
 def test_a_missing_library_is_one_clear_line(monkeypatch, capsys):
-    monkeypatch.setattr("wsn_env.front.find_spec", lambda name: None)
+    monkeypatch.setattr("wsn_env.evaluation.front.find_spec", lambda name: None)
     assert main(["evaluate", "--pareto"]) == 2
     assert capsys.readouterr().err.strip() == "wsn: fronts need moocore: pip install 'wsn_env[front]'"

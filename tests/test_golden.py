@@ -17,7 +17,8 @@ import pytest
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
 from tests.worlds import leaves
-from wsn_env import Scenario, View, World, draws, make_policy
+from wsn_env import Scenario, View, World, make_policy
+from wsn_env.compiled import draws
 
 HERE = Path(__file__).parents[1]
 ROWS = 8

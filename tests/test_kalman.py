@@ -8,7 +8,7 @@ from filterpy.kalman import KalmanFilter, MerweScaledSigmaPoints, UnscentedKalma
 
 from tests.anchors import play_subsets, ring_scenario, tell
 from wsn_env import Scenario, View, World, make_policy
-from wsn_env.trackers.kalman import constant_velocity, square_root
+from wsn_env.filters.kalman import constant_velocity, square_root
 
 F = np.array([[1, 1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 1], [0, 0, 0, 1.0]])
 G = np.array([[0.5, 0], [1, 0], [0, 0.5], [0, 1]])

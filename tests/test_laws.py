@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from tests.worlds import KEYS, assert_same, choices, keys_of, leaves, living_entries, play, scenarios
 from wsn_env import Cluster, Scenario, View, World, make_policy
-from wsn_env.interface import Interface, Settings
-from wsn_env.sections import BOUNDARY_TRACKERS
+from wsn_env.envs.interface import Interface, Settings
+from wsn_env.scenario.tracking import BOUNDARY_TRACKERS
 
 HAND_WRITTEN = "all boundary centroid nearest0 nearest3 pre_dc random static_cluster strongest_signal".split()
 HAND_WRITTEN += "adaptive adaptive_informed greedy informed2".split()

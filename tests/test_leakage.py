@@ -5,10 +5,10 @@ import pytest
 
 from tests.anchors import play_subsets, ring_scenario
 from wsn_env import World
-from wsn_env.physics.motion import predict_moments
-from wsn_env.sections import BOUNDARY_TRACKERS, TRACKERS
-from wsn_env.trackers import make_tracker
-from wsn_env.trackers.fingerprint import _network, _training, trained_network, training_of
+from wsn_env.filters import make_tracker
+from wsn_env.filters.fingerprint import _network, _training, trained_network, training_of
+from wsn_env.models.physics.motion import predict_moments
+from wsn_env.scenario.tracking import BOUNDARY_TRACKERS, TRACKERS
 
 CASES = [(name, start) for name in TRACKERS for start in ("known", "fix")]
 OVERRIDES = {  # name: what a tracker needs in place of the anchors' strengths

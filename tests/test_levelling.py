@@ -5,7 +5,7 @@ import torch
 from gymnasium.spaces import Box, Discrete
 from stable_baselines3.common.buffers import RolloutBuffer
 
-from agents.levelling import WIDTH, LevelledRollout
+from wsn_env.learning.levelling import WIDTH, LevelledRollout
 
 PERIODS, ROWS, TIMES = 64, 256, 10.0
 

@@ -6,11 +6,11 @@ from scipy import stats
 
 from tests.worlds import sensors_of
 from wsn_env import Scenario, View, World
-from wsn_env.compiling import kernel
-from wsn_env.interface.actions import MenuAction
-from wsn_env.interface.merit import gain
-from wsn_env.physics.constants import constants
-from wsn_env.types import KEEP_CLUSTER
+from wsn_env.compiled.kernels import kernel
+from wsn_env.envs.actions import MenuAction
+from wsn_env.envs.merit import gain
+from wsn_env.models.physics.constants import constants
+from wsn_env.simulation.state import KEEP_CLUSTER
 
 MOVE_WITH_ALL = 18  # the best node leads, the next eight follow
 

@@ -17,7 +17,7 @@ def make():
     pytest.importorskip("ray")
     from ray.rllib.algorithms.ppo import PPOConfig
 
-    from agents.native_runner import NativeRunner
+    from wsn_env.learning.native_runner import NativeRunner
 
     def runner(**settings):
         config = (

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import torch
 
-from agents.actor_critic import EntryActorCritic
-from agents.network import EntryNetwork, FlatNetwork, Network
+from wsn_env.learning.actor_critic import EntryActorCritic
+from wsn_env.learning.network import EntryNetwork, FlatNetwork, Network
 
 BELIEF, ENTRY = 7, 5
 

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 from scipy import special
 
-from wsn_env import draws, numerics
-from wsn_env.compiling import fast, piece
+from wsn_env.compiled import draws
+from wsn_env.compiled import elementary as numerics
+from wsn_env.compiled.kernels import fast, piece
 
 N = 200_000
 
@@ -230,7 +231,7 @@ def test_its_logarithm_in_float32_is_scipys(mode, uniform):
 def test_expected_error_is_the_mean_length_of_a_normal_vector():
     from scipy.special import ellipe
 
-    from wsn_env.numerics import expected_error
+    from wsn_env.compiled.elementary import expected_error
 
     for minor in np.linspace(0, 1, 21):
         exact = np.sqrt(2 / np.pi) * ellipe(1 - minor**2)

@@ -5,18 +5,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from wsn_env.agents.adaptive import RULES, Adaptive, Switch
+from wsn_env.agents.greedy import Greedy, Terms
+from wsn_env.agents.nearest import ORDERS, Nearest
+from wsn_env.agents.tuned import TABLE, nearest_lam
 
-from agents import tuning
-from agents.adaptive import RULES, Adaptive, Switch
-from agents.greedy import Greedy, Terms
-from agents.nearest import ORDERS, Nearest
-from agents.tuned import TABLE, nearest_lam
 from tests.test_policies import SCENARIO, chosen, walked
 from wsn_env import Scenario, View, World
-from wsn_env.interface.actions import MenuAction
-from wsn_env.physics.constants import constants
-from wsn_env.physics.sensing import mean_detection
-from wsn_env.quantity import ScenarioError
+from wsn_env.envs.actions import MenuAction
+from wsn_env.learning import tuning
+from wsn_env.models.physics.constants import constants
+from wsn_env.models.physics.sensing import mean_detection
+from wsn_env.models.quantity import ScenarioError
 
 RSSI = Scenario.named("Rssi-v0", particles=200)
 EVER = 1e9  # a hysteresis that no head leaves

@@ -13,10 +13,10 @@ from tests.browser import chromium, complaints
 from wsn_env import Scenario, World, evaluate, make_policy
 from wsn_env.bluetooth.synthetic import write_dataset
 from wsn_env.cli import main
-from wsn_env.pages.learning import read_progress
-from wsn_env.pages.replay_page import replay
-from wsn_env.registration import IDS
-from wsn_env.rollout import episodes, evaluation_seeds
+from wsn_env.envs.registration import IDS
+from wsn_env.evaluation.rollout import episodes, evaluation_seeds
+from wsn_env.reports.pages.learning import read_progress
+from wsn_env.reports.pages.replay_page import replay
 
 SEED = evaluation_seeds(0, 3)[2]
 TWO = {"Binary-v0": ("boundary", "nearest2"), "Underwater-v0": ("strongest_signal", "nearest2")}
@@ -151,7 +151,7 @@ def test_labels_are_no_formulas(tmp_path):
 
 
 def test_without_matplotlib_there_is_no_report_but_all_else(tmp_path, monkeypatch):
-    monkeypatch.setattr("wsn_env.pictures.find_spec", lambda name: None)
+    monkeypatch.setattr("wsn_env.reports.pictures.find_spec", lambda name: None)
     assert main(["evaluate", "--policies", "nearest1", "--episodes", "2", "--out", str(tmp_path)]) == 0
     assert {path.name for path in tmp_path.iterdir()} == {"evaluation.csv", "evaluation.json", "evaluation.md"}
 

@@ -6,14 +6,14 @@ import pytest
 
 from tests.worlds import leaves
 from wsn_env import Scenario, World, make_policy
-from wsn_env.compiling import fast
-from wsn_env.physics.constants import constants
-from wsn_env.physics.motion import predict_moments
-from wsn_env.physics.sensing import detection_probability
-from wsn_env.rollout import episodes
-from wsn_env.trackers import kernels, likelihood
-from wsn_env.trackers.particle import ParticleTracker
-from wsn_env.types import State
+from wsn_env.compiled.kernels import fast
+from wsn_env.evaluation.rollout import episodes
+from wsn_env.filters import kernels, likelihood
+from wsn_env.filters.particle import ParticleTracker
+from wsn_env.models.physics.constants import constants
+from wsn_env.models.physics.motion import predict_moments
+from wsn_env.models.physics.sensing import detection_probability
+from wsn_env.simulation.state import State
 
 NODES = np.array([[40.0, 50.0], [55.0, 45.0], [52.0, 60.0], [47.0, 41.0]])
 P0 = np.diag([1.0, 0.01, 1.0, 0.01])

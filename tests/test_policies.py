@@ -7,18 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from wsn_env.agents.base import ViewPolicy
+from wsn_env.agents.boundary import Boundary
+from wsn_env.agents.nearest import Nearest
+from wsn_env.agents.pre_dc import PreDC
+from wsn_env.agents.strongest_signal import StrongestSignal
 
-from agents.base import ViewPolicy
-from agents.boundary import Boundary
-from agents.nearest import Nearest
-from agents.pre_dc import PreDC
-from agents.strongest_signal import StrongestSignal
-from wsn_env import Scenario, View, World, draws, evaluate, make_policy
+from wsn_env import Scenario, View, World, evaluate, make_policy
 from wsn_env.cli import main
-from wsn_env.kept_blocks import BLOCKS_FILE
-from wsn_env.physics.sensing import detection_probability
-from wsn_env.policies import named_policies, policy_names
-from wsn_env.types import Cluster
+from wsn_env.compiled import draws
+from wsn_env.evaluation.kept_blocks import BLOCKS_FILE
+from wsn_env.evaluation.policies import named_policies, policy_names
+from wsn_env.models.physics.sensing import detection_probability
+from wsn_env.simulation.state import Cluster
 
 SCENARIO = Scenario.named("PreDC-v0", particles=200)
 
@@ -278,7 +279,7 @@ def test_a_package_of_ones_own_adds_a_policy(tmp_path):
     (tmp_path / "mine.py").write_text(
         textwrap.dedent(
             """
-            from agents.nearest import Nearest
+            from wsn_env.agents.nearest import Nearest
             def lazy(scenario):
                 return Nearest(scenario, n=1, hysteresis_m=20.0)
             """
@@ -287,7 +288,7 @@ def test_a_package_of_ones_own_adds_a_policy(tmp_path):
     info = tmp_path / "mine-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[wsn_env.policies]\nlazy = mine:lazy\n")
+    (info / "entry_points.txt").write_text("[wsn_env.evaluation.policies]\nlazy = mine:lazy\n")
     code = (
         f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
         "from wsn_env import Scenario, make_policy\n"
@@ -311,7 +312,7 @@ def test_parameters_of_the_published_policies_are_checked():
 
 OWN = """
 import numpy as np
-from agents.base import ViewPolicy
+from wsn_env.agents.base import ViewPolicy
 from wsn_env import Cluster
 
 class Mine(ViewPolicy):

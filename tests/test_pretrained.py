@@ -5,10 +5,10 @@ import re
 from pathlib import Path
 
 import pytest
+from wsn_env.agents.ppo import PRETRAINED
 
-from agents.ppo import PRETRAINED
 from wsn_env import Scenario, make_policy
-from wsn_env.evaluation import evaluate
+from wsn_env.evaluation.comparison import evaluate
 
 DOCS = Path(__file__).parents[1] / "docs"
 STEPS = {"Ble-v0": 1_000_000, "PreDC-v0": 3_000_000, "Rssi-v0": 4_000_000}

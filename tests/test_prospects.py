@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from wsn_env import Scenario, View, World, draws
-from wsn_env.interface import Interface, Settings
-from wsn_env.interface.actions import MENU_ENTRIES
-from wsn_env.interface.features import BELIEF_FEATURES
-from wsn_env.interface.prospects import ENTRY_FEATURES
-from wsn_env.physics.constants import constants
-from wsn_env.physics.sensing import mean_detection
+from wsn_env import Scenario, View, World
+from wsn_env.compiled import draws
+from wsn_env.envs.actions import MENU_ENTRIES
+from wsn_env.envs.features import BELIEF_FEATURES
+from wsn_env.envs.interface import Interface, Settings
+from wsn_env.envs.prospects import ENTRY_FEATURES
+from wsn_env.models.physics.constants import constants
+from wsn_env.models.physics.sensing import mean_detection
 
 ROWS = 4000
 ENTRIES = (0, 1, 3, 6, 10, 12, 15, 19, 22)  # as it is; head kept, moved to the best, moved ahead

@@ -5,12 +5,12 @@ import pickle
 import signal
 
 import pytest
+from wsn_env.agents.ppo import PPOPolicy
 
-from agents.ppo import PPOPolicy
 from wsn_env import Scenario, evaluate, make_policy
 from wsn_env.cli import main
-from wsn_env.ray_engine import on_ray
-from wsn_env.rollout import BLOCK
+from wsn_env.evaluation.ray_engine import on_ray
+from wsn_env.evaluation.rollout import BLOCK
 
 SCENARIO = Scenario.named("PreDC-v0", particles=50, nodes=40, side_m=50.0, crossing_m=20.0, periods=10)
 ROOT = os.path.dirname(os.path.dirname(__file__))

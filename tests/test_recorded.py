@@ -10,8 +10,8 @@ import pytest
 
 from examples.ble_tracks import positions
 from wsn_env import Scenario, World, evaluate
-from wsn_env.bluetooth.dataset import read_dataset
 from wsn_env.bluetooth.synthetic import write_dataset
+from wsn_env.models.recordings.dataset import read_dataset
 
 FOLDER = os.environ.get("WSN_BLE_DIR")
 SCRIPT = Path(__file__).parents[1] / "examples" / "ble_tracks.py"

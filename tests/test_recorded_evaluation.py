@@ -11,11 +11,11 @@ import pytest
 
 from wsn_env import Cluster, Scenario, World
 from wsn_env.bluetooth.calibration import calibrate
-from wsn_env.bluetooth.dataset import read_dataset, track_files
+from wsn_env.bluetooth.recorded_evaluation import evaluate_recorded
 from wsn_env.bluetooth.synthetic import write_dataset
 from wsn_env.cli import main
-from wsn_env.quantity import ScenarioError
-from wsn_env.recorded_evaluation import evaluate_recorded
+from wsn_env.models.quantity import ScenarioError
+from wsn_env.models.recordings.dataset import read_dataset, track_files
 
 BLE = Scenario.named("Ble-v0", particles=200)
 
@@ -208,7 +208,7 @@ def test_the_published_tracks_give_the_figures_of_the_study():
 def simulate(policy):
     """RMS of a policy over 200 simulated walks."""
     from wsn_env import make_policy
-    from wsn_env.rollout import rollout
+    from wsn_env.evaluation.rollout import rollout
 
     scenario = Scenario.named("Ble-v0")
     rows = rollout(make_policy(policy, scenario), World(scenario), list(range(200)))

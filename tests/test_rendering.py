@@ -11,10 +11,10 @@ import pytest
 from PIL import Image
 
 from wsn_env import ClusterEnv, ClusterVectorEnv
-from wsn_env.registration import IDS
-from wsn_env.rendering import camera
-from wsn_env.rendering.palette import BLUE, FLASH, GREEN, ORANGE, PURPLE, VERMILION, YELLOW
-from wsn_env.rendering.plan import WORDS_FROM, legend, plan_of
+from wsn_env.envs.registration import IDS
+from wsn_env.envs.rendering import camera
+from wsn_env.envs.rendering.palette import BLUE, FLASH, GREEN, ORANGE, PURPLE, VERMILION, YELLOW
+from wsn_env.envs.rendering.plan import WORDS_FROM, legend, plan_of
 
 GOLDEN = Path(__file__).parent / "golden" / "frame.png"
 

@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 
 from tests.test_particle import Filter
-from wsn_env import Cluster, Scenario, World, draws
-from wsn_env.compiling import fast
-from wsn_env.trackers import kernels, resampling
+from wsn_env import Cluster, Scenario, World
+from wsn_env.compiled import draws
+from wsn_env.compiled.kernels import fast
+from wsn_env.filters import kernels, resampling
 
 COV = np.array([[4.0, 0.6, 1.0, 0.1], [0.6, 0.3, 0.2, 0.0], [1.0, 0.2, 2.0, -0.4], [0.1, 0.0, -0.4, 0.5]])
 

@@ -8,15 +8,15 @@ from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import DummyVecEnv, VecFrameStack
+from wsn_env.agents.base import ViewPolicy
 
-from agents.base import ViewPolicy
-from agents.fleet import Fleet
-from agents.sb3 import SB3VecEnv
-from agents.training_reward import TrainingReward
 from tests.test_env import same
 from wsn_env import Cluster, ClusterEnv, ClusterVectorEnv, Scenario, make_policy
-from wsn_env.evaluation import evaluate
-from wsn_env.policies import policy_names
+from wsn_env.evaluation.comparison import evaluate
+from wsn_env.evaluation.policies import policy_names
+from wsn_env.learning.fleet import Fleet
+from wsn_env.learning.sb3 import SB3VecEnv
+from wsn_env.learning.training_reward import TrainingReward
 
 SMALL = dict(particles=50, nodes=30, side_m=50.0, crossing_m=20.0, periods=13)
 

@@ -5,8 +5,8 @@ import sys
 
 import numpy as np
 import pytest
+from wsn_env.agents.ppo import PRETRAINED
 
-from agents.ppo import PRETRAINED
 from studies import ablations, seeds, transfer
 from studies.report import draw_curves, learning_curve, over_seeds, table
 from wsn_env import Scenario

@@ -7,11 +7,11 @@ from scipy.stats import norm
 
 from tests.test_particle import NODES, Filter
 from wsn_env import Cluster, Scenario, ScenarioError, World
-from wsn_env.compiling import fast
-from wsn_env.physics.constants import constants
-from wsn_env.physics.sensing import detection_probability
-from wsn_env.sections import Detection, Position, Rssi, Sonar, Threshold
-from wsn_env.trackers import likelihood
+from wsn_env.compiled.kernels import fast
+from wsn_env.filters import likelihood
+from wsn_env.models.physics.constants import constants
+from wsn_env.models.physics.sensing import detection_probability
+from wsn_env.models.sections import Detection, Position, Rssi, Sonar, Threshold
 
 UNDERWATER = Scenario.named("Underwater-v0")
 ALPHA = 1.18703e-3

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from wsn_env.agents.ppo import PPOPolicy
 
 import train
-from agents.actor_critic import network_of
-from agents.network import EntryNetwork, Network
-from agents.ppo import PPOPolicy
 from wsn_env import ClusterVectorEnv, Scenario, View, evaluate, make_policy
 from wsn_env.cli import parse_overrides
+from wsn_env.learning.actor_critic import network_of
+from wsn_env.learning.network import EntryNetwork, Network
 
 SET = ["particles=50", "nodes=40", "side_m=50", "crossing_m=20", "periods=10"]
 SHORT = dict(steps=4096, rows=32, rollout=32, batch=512, epochs=2, episodes=60, checkpoint_steps=1024, set=SET)

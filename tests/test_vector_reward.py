@@ -9,9 +9,9 @@ from mo_gymnasium.wrappers import LinearReward, MONormalizeReward, MORecordEpiso
 from mo_gymnasium.wrappers.vector import MORecordEpisodeStatistics as RecordRows
 from mo_gymnasium.wrappers.vector import MOSyncVectorEnv
 
-from agents.sb3 import SB3VecEnv
 from tests.test_env import SMALL, same
 from wsn_env import ClusterEnv, ClusterVectorEnv
+from wsn_env.learning.sb3 import SB3VecEnv
 
 SINGLE_PRECISION = 1e-6
 

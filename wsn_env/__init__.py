@@ -7,24 +7,24 @@ envs = gym.make_vec("wsn_env/PreDC-v0", num_envs=64, vectorization_mode="vector_
 
 import importlib
 
-from wsn_env.registration import register_envs
+from wsn_env.envs.registration import register_envs
 
 __version__ = "0.1.0"
 
 _HOMES = {
     "Scenario": "wsn_env.scenario",
-    "ScenarioError": "wsn_env.quantity",
-    "World": "wsn_env.world",
-    "View": "wsn_env.view",
-    "State": "wsn_env.types",
-    "Cluster": "wsn_env.types",
-    "Outcome": "wsn_env.types",
-    "ClusterEnv": "wsn_env.env",
-    "ClusterVectorEnv": "wsn_env.vector_env",
-    "evaluate": "wsn_env.evaluation",
-    "score": "wsn_env.scoring",
-    "make_policy": "wsn_env.policies",
-    "register_envs": "wsn_env.registration",
+    "ScenarioError": "wsn_env.models.quantity",
+    "World": "wsn_env.simulation.world",
+    "View": "wsn_env.simulation.view",
+    "State": "wsn_env.simulation.state",
+    "Cluster": "wsn_env.simulation.state",
+    "Outcome": "wsn_env.simulation.state",
+    "ClusterEnv": "wsn_env.envs.env",
+    "ClusterVectorEnv": "wsn_env.envs.vector_env",
+    "evaluate": "wsn_env.evaluation.comparison",
+    "score": "wsn_env.evaluation.scoring",
+    "make_policy": "wsn_env.evaluation.policies",
+    "register_envs": "wsn_env.envs.registration",
 }
 __all__ = ["__version__", *_HOMES]
 

@@ -11,8 +11,8 @@ from typing import Annotated, Literal
 
 import tyro
 
-from wsn_env.progress import progress_bar
-from wsn_env.quantity import parse_overrides
+from wsn_env.evaluation.progress import progress_bar
+from wsn_env.models.quantity import parse_overrides
 from wsn_env.scenario import Scenario
 
 
@@ -135,15 +135,15 @@ def place_of(problem: Exception) -> str:
 
 def run_evaluate(command: Evaluate) -> None:
     """`wsn evaluate`."""
-    from wsn_env.evaluation import evaluate
-    from wsn_env.front import check_front_libraries, lam_sweep
-    from wsn_env.front_report import FRONT_FILES, report_front
-    from wsn_env.kept_blocks import forget_blocks
-    from wsn_env.pages.report_page import write_report
-    from wsn_env.pictures import can_draw
-    from wsn_env.policies import named_policies
-    from wsn_env.ray_engine import on_ray
-    from wsn_env.reports import print_tables, save_markdown
+    from wsn_env.evaluation.comparison import evaluate
+    from wsn_env.evaluation.front import check_front_libraries, lam_sweep
+    from wsn_env.evaluation.kept_blocks import forget_blocks
+    from wsn_env.evaluation.policies import named_policies
+    from wsn_env.evaluation.ray_engine import on_ray
+    from wsn_env.reports.front import FRONT_FILES, report_front
+    from wsn_env.reports.pages.report_page import write_report
+    from wsn_env.reports.pictures import can_draw
+    from wsn_env.reports.tables import print_tables, save_markdown
 
     if command.address and command.engine != "ray":
         raise ValueError(f"--address {command.address}: only with --engine ray")
@@ -184,10 +184,10 @@ def run_evaluate(command: Evaluate) -> None:
 
 def run_evaluate_recorded(command: Evaluate) -> None:
     """`wsn evaluate --scenario Ble-v0 --tracks FOLDER`."""
-    from wsn_env import recorded_evaluation
-    from wsn_env.pages.recorded_report import write_recorded_report
-    from wsn_env.pictures import can_draw
-    from wsn_env.ray_engine import on_ray
+    from wsn_env.bluetooth import recorded_evaluation
+    from wsn_env.evaluation.ray_engine import on_ray
+    from wsn_env.reports.pages.recorded_report import write_recorded_report
+    from wsn_env.reports.pictures import can_draw
 
     if command.pareto or len(command.tracks) != 1:
         raise ValueError("--tracks: must be one folder with tetam.dev and *.mbd, without --pareto")
@@ -216,9 +216,9 @@ def run_evaluate_recorded(command: Evaluate) -> None:
 
 def run_replay(command: Replay) -> None:
     """`wsn replay`."""
-    from wsn_env.pages.replay_page import replay
-    from wsn_env.policies import named_policies
-    from wsn_env.recorded_evaluation import replay_scenario
+    from wsn_env.bluetooth.recorded_evaluation import replay_scenario
+    from wsn_env.evaluation.policies import named_policies
+    from wsn_env.reports.pages.replay_page import replay
 
     given = {} if command.lam is None else {"lam": command.lam}
     scenario = make_scenario(command.scenario, command.set, [], **given)
@@ -247,11 +247,11 @@ def run_reproduce(command: Reproduce) -> None:
 
 def run_compile(command: Compile) -> None:
     """`wsn compile`: play a little of everything."""
-    from wsn_env.env import ClusterEnv
-    from wsn_env.policies import make_policy
-    from wsn_env.rollout import episodes, rollout
-    from wsn_env.view import View
-    from wsn_env.world import World
+    from wsn_env.envs.env import ClusterEnv
+    from wsn_env.evaluation.policies import make_policy
+    from wsn_env.evaluation.rollout import episodes, rollout
+    from wsn_env.simulation.view import View
+    from wsn_env.simulation.world import World
 
     started = time.perf_counter()
     for fast in (False, True):

@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.filters.contestant import Absent, Contestant
 from benchmarks.filters.problem import MEMBERS, Problem
-from wsn_env.world import World
+from wsn_env.simulation.world import World
 
 
 class Strict(Contestant):

@@ -11,8 +11,8 @@ import numpy as np
 
 from benchmarks.filters.contestant import Absent, Contestant
 from benchmarks.filters.problem import MEMBERS, PERIODS, Problem
-from wsn_env import draws
-from wsn_env.trackers.resampling import REACH
+from wsn_env.compiled import draws
+from wsn_env.filters.resampling import REACH
 
 SOURCE = Path(__file__).with_name("reference.c")
 # Neither errno nor traps are results, and without them gcc uses vectors throughout.

@@ -26,11 +26,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import least_squares, minimize
 
-from wsn_env.files import replacing
-from wsn_env.quantity import ScenarioError, check_quantity, suggest
+from wsn_env.evaluation.files import replacing
+from wsn_env.models.quantity import ScenarioError, check_quantity, suggest
 
 if TYPE_CHECKING:
-    from wsn_env.bluetooth.dataset import Track
+    from wsn_env.models.recordings.dataset import Track
 
 KIND, VERSION = "wsn_env calibration", 1
 

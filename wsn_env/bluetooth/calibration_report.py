@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from wsn_env import colours
 from wsn_env.bluetooth.calibration import (
     NUMBERS,
     Autocovariance,
@@ -24,12 +23,13 @@ from wsn_env.bluetooth.calibration import (
     normal_density,
     residuals,
 )
-from wsn_env.bluetooth.dataset import Track, read_dataset
 from wsn_env.bluetooth.residual_map import residual_map, save_map
-from wsn_env.files import replacing
-from wsn_env.pictures import write_picture
-from wsn_env.quantity import suggest
-from wsn_env.reports import wide_console
+from wsn_env.envs.rendering import colours
+from wsn_env.evaluation.files import replacing
+from wsn_env.models.quantity import suggest
+from wsn_env.models.recordings.dataset import Track, read_dataset
+from wsn_env.reports.pictures import write_picture
+from wsn_env.reports.tables import wide_console
 
 REPORT_FILES = ("calibration.md", "calibration.png")
 SOURCE = (

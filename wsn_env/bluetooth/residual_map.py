@@ -11,11 +11,11 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from wsn_env.bluetooth.calibration import Calibration, CalibrationError, gather, residuals
-from wsn_env.bluetooth.replay import CELL_M
-from wsn_env.files import replacing
+from wsn_env.evaluation.files import replacing
+from wsn_env.models.recordings.replay import CELL_M
 
 if TYPE_CHECKING:
-    from wsn_env.bluetooth.dataset import Track
+    from wsn_env.models.recordings.dataset import Track
 
 VARIANCE, LENGTH_M = 5.0, 1.5  # of the field, dB^2 and m
 SHARED_NOISE, PACKET_NOISE = 3.0, 18.0  # dB^2 of a cell's mean: drift, and white part over the number of packets

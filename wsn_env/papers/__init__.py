@@ -5,8 +5,8 @@ from __future__ import annotations
 from importlib import import_module
 from pathlib import Path
 
-from wsn_env.progress import Progress
-from wsn_env.quantity import suggest
+from wsn_env.evaluation.progress import Progress
+from wsn_env.models.quantity import suggest
 
 PAPERS = {name: f"wsn_env.papers.{name}" for name in ("pre_dc", "binary", "grnn", "underwater")}
 

@@ -15,9 +15,9 @@ from typing import Any
 from rich.markup import escape
 from rich.table import Table
 
-from wsn_env.files import replacing
-from wsn_env.pictures import NEEDED, can_draw
-from wsn_env.reports import wide_console
+from wsn_env.evaluation.files import replacing
+from wsn_env.reports.pictures import NEEDED, can_draw
+from wsn_env.reports.tables import wide_console
 
 HOLDS = "holds"
 UNDER_READING = "holds under a stated reading"

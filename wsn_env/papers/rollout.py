@@ -13,12 +13,12 @@ from math import ceil
 
 import numpy as np
 
-from wsn_env.policies import make_policy
-from wsn_env.progress import Progress
-from wsn_env.rollout import BLOCK, FIRST_SEED, episodes
+from wsn_env.evaluation.policies import make_policy
+from wsn_env.evaluation.progress import Progress
+from wsn_env.evaluation.rollout import BLOCK, FIRST_SEED, episodes
 from wsn_env.scenario import Scenario
-from wsn_env.types import PURPOSES
-from wsn_env.world import World
+from wsn_env.simulation.state import PURPOSES
+from wsn_env.simulation.world import World
 
 REPORT = PURPOSES.index("report")
 SIGNIFICANT = 2.0  # standard errors

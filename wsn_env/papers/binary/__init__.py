@@ -28,11 +28,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from wsn_env.evaluation.progress import Progress, progress_bar
 from wsn_env.papers import report
 from wsn_env.papers.binary import figures
 from wsn_env.papers.binary.claims import Study, claims, expected
 from wsn_env.papers.binary.systems import play_paper
-from wsn_env.progress import Progress, progress_bar
 
 
 def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:

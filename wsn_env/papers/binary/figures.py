@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from wsn_env.colours import BLACK, BLUE, GREEN, GREY, PURPLE, VERMILION
+from wsn_env.envs.rendering.colours import BLACK, BLUE, GREEN, GREY, PURPLE, VERMILION
 from wsn_env.papers.binary.claims import Study
 from wsn_env.papers.binary.readings import boundary_nodes, detecting_nodes
 from wsn_env.papers.binary.systems import FAULTS, NODES, PERIODS_S, RADII_M, SWEPT, SYSTEMS, Results, Setting
 from wsn_env.papers.report import Sheet, by_period, new_axes, write_sheet
-from wsn_env.pictures import write_picture
+from wsn_env.reports.pictures import write_picture
 
 LOOKS = {
     "centroid": ("centroid", dict(color=VERMILION, linestyle="--")),

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from wsn_env import draws
+from wsn_env.compiled import draws
+from wsn_env.evaluation.rollout import FIRST_SEED
 from wsn_env.papers.binary.systems import SIDE_M, VELOCITY_MS, Setting
-from wsn_env.rollout import FIRST_SEED
-from wsn_env.world import World
+from wsn_env.simulation.world import World
 
 V = np.array(VELOCITY_MS)
 CONDITION = 5.0  # snapshots that are worse conditioned say nothing about a reading

@@ -7,10 +7,10 @@ from math import floor
 
 import numpy as np
 
+from wsn_env.evaluation.progress import Progress
+from wsn_env.models.sections import Binary, Detection, Legs
 from wsn_env.papers.rollout import Record, Trial, play_all
-from wsn_env.progress import Progress
 from wsn_env.scenario import Scenario
-from wsn_env.sections import Binary, Detection, Legs
 
 NODES = (400, 500, 600, 700, 800)
 RADII_M = (40.0, 50.0, 60.0, 70.0, 80.0)

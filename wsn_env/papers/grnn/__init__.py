@@ -30,6 +30,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from wsn_env.evaluation.progress import Progress, progress_bar
+from wsn_env.filters.fingerprint import training_of
 from wsn_env.papers import report
 from wsn_env.papers.grnn import figures
 from wsn_env.papers.grnn.claims import EXPECTED_RMSE_M, claims, expected
@@ -46,8 +48,6 @@ from wsn_env.papers.grnn.systems import (
     scenario_as_read,
 )
 from wsn_env.papers.report import Sheet
-from wsn_env.progress import Progress, progress_bar
-from wsn_env.trackers.fingerprint import training_of
 
 
 def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:

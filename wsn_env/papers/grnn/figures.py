@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from wsn_env.colours import BLACK, BLUE, GREEN, GREY, PURPLE, SKY, VERMILION
+from wsn_env.envs.rendering.colours import BLACK, BLUE, GREEN, GREY, PURPLE, SKY, VERMILION
 from wsn_env.papers.grnn.systems import ANCHORS, EQUAL_INFORMATION, METHODS, PERIODS_S, STARTED, Results
 from wsn_env.papers.report import Sheet, new_axes, write_sheet
-from wsn_env.pictures import write_picture
+from wsn_env.reports.pictures import write_picture
 
 LOOKS = {
     "nonlinear_ls": dict(color=GREY, linestyle=":"),

@@ -8,13 +8,13 @@ from itertools import product
 
 import numpy as np
 
+from wsn_env.evaluation.progress import Progress
+from wsn_env.models.physics.field import fixed_positions
+from wsn_env.models.physics.sensing import linearised_strengths
+from wsn_env.models.sections import Detection, Legs, Rssi
 from wsn_env.papers.rollout import Record, Trial, play_all
-from wsn_env.physics.field import fixed_positions
-from wsn_env.physics.sensing import linearised_strengths
-from wsn_env.progress import Progress
 from wsn_env.scenario import RING_OF_EIGHT, Scenario
-from wsn_env.sections import Detection, Legs, Rssi
-from wsn_env.world import World
+from wsn_env.simulation.world import World
 
 PERIODS_S = (0.1, 0.2, 0.5, 1.0)
 METHODS = {  # tracker: what it is called

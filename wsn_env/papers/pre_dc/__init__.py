@@ -36,13 +36,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from wsn_env.evaluation.progress import Progress, progress_bar
 from wsn_env.papers import report
 from wsn_env.papers.pre_dc import figures
 from wsn_env.papers.pre_dc.claims import PAPER_RMS_M, claims, expected
 from wsn_env.papers.pre_dc.systems import NODES, SAME_TRACKER, SYSTEMS, Results, play_paper
 from wsn_env.papers.report import Sheet
 from wsn_env.papers.rollout import standard_error
-from wsn_env.progress import Progress, progress_bar
 
 
 def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:

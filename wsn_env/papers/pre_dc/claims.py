@@ -10,11 +10,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from wsn_env.models.physics.sensing import detection_probability, joint_detection_probability
+from wsn_env.models.sections import Detection
 from wsn_env.papers.pre_dc.systems import MOTIONS, NODES, PARTICLES, Results
 from wsn_env.papers.report import Claim, Expectation, verdict
 from wsn_env.papers.rollout import Record, exceeds, keeps_falling
-from wsn_env.physics.sensing import detection_probability, joint_detection_probability
-from wsn_env.sections import Detection
 
 STABLE = 1.25  # the error is stable while no later quarter of a run exceeds the first by this factor
 FLAT = 0.03  # an error that more particles change by less than this share is flat

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from wsn_env.colours import BLACK, BLUE, DARK, GREEN, GREY, VERMILION
+from wsn_env.envs.rendering.colours import BLACK, BLUE, DARK, GREEN, GREY, VERMILION
+from wsn_env.models.physics.sensing import detection_probability
+from wsn_env.models.sections import Detection
 from wsn_env.papers.pre_dc.systems import MOTIONS, PARTICLES, SYSTEMS, Results
 from wsn_env.papers.report import Sheet, by_period, new_axes, tidy, write_sheet
 from wsn_env.papers.rollout import standard_error
-from wsn_env.physics.sensing import detection_probability
-from wsn_env.pictures import write_picture
-from wsn_env.sections import Detection
+from wsn_env.reports.pictures import write_picture
 
 STATIC, EKF, PRE_DC = VERMILION, BLUE, BLACK
 LOOKS = {  # system: label, style of its line

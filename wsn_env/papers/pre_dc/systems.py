@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wsn_env.evaluation.progress import Progress
+from wsn_env.models.sections import Position, Straight
 from wsn_env.papers.rollout import Record, Trial, play_all
-from wsn_env.progress import Progress
 from wsn_env.scenario import Scenario
-from wsn_env.sections import Position, Straight
 
 NODES = (81, 121, 169, 225)
 READING = dict(

@@ -26,11 +26,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from wsn_env.evaluation.progress import Progress, progress_bar
 from wsn_env.papers import report
 from wsn_env.papers.underwater import figures
 from wsn_env.papers.underwater.claims import claims, expected
 from wsn_env.papers.underwater.systems import play_system
-from wsn_env.progress import Progress, progress_bar
 
 
 def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:

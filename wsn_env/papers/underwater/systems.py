@@ -7,8 +7,8 @@ from math import sqrt
 
 import numpy as np
 
+from wsn_env.evaluation.progress import Progress
 from wsn_env.papers.rollout import Record, Trial, play_all
-from wsn_env.progress import Progress
 from wsn_env.scenario import Scenario
 
 NOISES = {1e-5: 60, 1e-3: 60, 3e-2: 30}  # density of the white acceleration [m^2/s^3]: periods

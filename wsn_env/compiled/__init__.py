@@ -1,0 +1,1 @@
+"""Elementary functions, randomness by key, and how kernels are compiled and kept."""

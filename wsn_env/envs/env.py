@@ -1,0 +1,150 @@
+"""The single environment: a World with one row."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+from wsn_env.compiled import draws
+from wsn_env.envs.interface import Interface, Settings
+from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera
+from wsn_env.scenario import Scenario
+from wsn_env.simulation.bound import Bound, bound_kind
+from wsn_env.simulation.state import OUTCOME, Outcome, State
+from wsn_env.simulation.view import View
+from wsn_env.simulation.world import World
+
+
+class ClusterEnv(gym.Env):
+    """Choose a cluster each period; the reward is minus (error + lam * energy).
+
+    Args:
+        scenario: an id such as "PreDC-v0", or a Scenario.
+        action: "menu" | "subset" | "radius" | "scores" | "nodes" | "cluster".
+        observation: "candidates" | "menu" | "dict" | "view".
+        reward: "error" (the mission's) | "belief" (lower variance, for training only) | "vector" ([-error, -energy] as
+            MO-Gymnasium has it, with `reward_space` and `reward_dim`).
+        order: "nearest" | "information" | "value", the menu's order of merit.
+        candidates: K, how many nodes actions and observations consider.
+        render_mode: None | "rgb_array" | "human", a window, for which pygame-ce must be installed.
+        frame_px: side of a frame.
+        fast: a quicker particle filter, equal to rounding, whose bits differ from processor to processor.
+        overrides: any quantity of the scenario: `nodes=400, particles=1000, lam=(0.3, 30), motion="sine"`.
+
+    An episode is truncated at the horizon and never terminates: a lost track or a dead network goes on.
+    """
+
+    metadata = {"render_modes": list(RENDER_MODES), "render_fps": FPS}
+
+    def __init__(
+        self,
+        scenario: str | Scenario = "PreDC-v0",
+        action: str = "menu",
+        observation: str = "candidates",
+        reward: str = "error",
+        order: str = "nearest",
+        candidates: int = Settings.candidates,
+        render_mode: str | None = None,
+        frame_px: int = 600,
+        fast: bool = False,
+        **overrides,
+    ):
+        self.scenario = Scenario.of(scenario, **overrides)
+        self._camera = None if render_mode is None else Camera(self.scenario, render_mode, frame_px)
+        self.interface = Interface(self.scenario, Settings(action, observation, reward, order, candidates))
+        self.world = World(self.scenario, threads=1, fast=fast)
+        self.render_mode = render_mode
+        self.action_space = self.interface.action.space
+        self.observation_space = self.interface.observation.space
+        if self.interface.reward_space is not None:
+            self.reward_space, self.reward_dim = self.interface.reward_space, 2
+        self._state: State | None = None
+        self._view: View | None = None
+        self._lam = 0.0
+        self._squares = 0.0
+        self._detections = 0
+        self._bound = None if bound_kind(self.scenario) == "none" else Bound(self.scenario)
+
+    def reset(self, *, seed: int | None = None, options: dict | None = None):
+        """A new episode: seed fixes field, track and every draw."""
+        super().reset(seed=seed)
+        state = self.world.allocate(1) if self._state is None else self._state
+        key = draws.episode_key(self.np_random)
+        self._state, outcome = self.world.restart(state, [True], np.array([key]), donate=True)
+        self._lam = self._state.lam.item()
+        self._squares = 0.0
+        self._detections = 0
+        info = self._judge(outcome)[1]
+        if self._bound is not None:
+            info["bound_m"] = self._bound.begin(self._state).item()
+        if self._camera is not None:
+            self._camera.begin(self._state, outcome, [True])
+            self._camera.show(self._state)
+        return self._observe(), info
+
+    def step(self, action):
+        """One period. Returns observation, reward, terminated (never), truncated, info."""
+        if self._state is None:
+            raise gym.error.ResetNeeded("call reset() before step()")
+        if self._state.period.item() >= self.scenario.periods:
+            raise gym.error.ResetNeeded(f"the episode ended after {self.scenario.periods} periods: call reset()")
+        cluster = self.interface.action.cluster(_batched(action), self._view)
+        self._state, outcome = self.world.step(self._state, cluster, donate=True)
+        reward, info = self._judge(outcome)
+        if self._state.period[0] > self.scenario.unscored:
+            self._squares += info["error_m"] * info["error_m"]
+        self._detections += info["detections"]
+        if self._bound is not None:
+            info["bound_m"] = self._bound.advance(self._state, outcome).item()
+        if self._camera is not None:
+            self._camera.add(self._state, outcome)
+            self._camera.show(self._state)
+        truncated = self._state.period.item() >= self.scenario.periods
+        if truncated:
+            info["episode_rms_m"] = math.sqrt(self._squares / self.scenario.scored)
+            info["antnp"] = self._detections / self.scenario.periods
+            if self._bound is not None:
+                info["episode_bound_m"] = self._bound.episode_m().item()
+                if self._bound.kind == "bound":
+                    info["episode_floor_m"] = self._bound.floor_m(self._state).item()
+        return self._observe(), reward, False, truncated, info
+
+    def _judge(self, outcome: Outcome) -> tuple[float | np.ndarray, dict[str, Any]]:
+        return self.interface.judge(dict(zip(OUTCOME.names, outcome.row.item())), self._lam)
+
+    @property
+    def view(self) -> View:
+        """What hand-written policies see now: `policy.act(env.view)` is their choice, whatever the action space."""
+        if self._view is None:
+            raise gym.error.ResetNeeded("call reset() first")
+        return self._view
+
+    def action_masks(self) -> np.ndarray:
+        """Which entries of the action make sense now (flat bool, as sb3-contrib's MaskablePPO wants them)."""
+        return self.interface.action.masks(self.view)[0]
+
+    def render(self):
+        """A frame (frame_px, frame_px, 3) uint8 of the present state; in "human" mode None: reset and step show it."""
+        if self._camera is None or self._state is None:
+            gym.logger.warn("render() needs render_mode='rgb_array' or 'human' and a reset environment")
+            return None
+        return self._camera.frames(self._state)[0] if self.render_mode == "rgb_array" else None
+
+    def close(self):
+        """Close the window, if there is one."""
+        if self._camera is not None:
+            self._camera.close()
+
+    def _observe(self):
+        self._view = View.of(self._state)
+        arrays = self.interface.observation.encode(self._view)
+        if isinstance(arrays, dict):
+            return {name: value[0] if value.ndim > 1 else value.item() for name, value in arrays.items()}
+        return arrays[0]
+
+
+def _batched(action):
+    return {k: np.asarray(v)[None] for k, v in action.items()} if isinstance(action, dict) else np.asarray(action)[None]

@@ -1,0 +1,264 @@
+"""Observations: a View as arrays, finite and clipped. lam is part of every one."""
+
+from __future__ import annotations
+
+import numpy as np
+from gymnasium import spaces
+
+from wsn_env.compiled.kernels import lean_kernel, over_rows, threads_for
+from wsn_env.envs.actions import GROUP, MENU_ENTRIES
+from wsn_env.envs.features import (
+    BELIEF_FEATURES,
+    BOUND,
+    CANDIDATE_FEATURES,
+    clip,
+    describe_belief,
+    describe_candidate,
+    describe_merit,
+)
+from wsn_env.envs.merit import ORDERS, fill_chances, order_row, rank_row
+from wsn_env.envs.prospects import ENTRY_FEATURES, describe_entries, describe_standing, foresee
+from wsn_env.models.physics.constants import constants
+from wsn_env.models.physics.field import find_candidates
+from wsn_env.models.quantity import suggest
+from wsn_env.scenario import Scenario
+from wsn_env.simulation.state import Sensors, network_of
+from wsn_env.simulation.view import View
+
+G = len(BELIEF_FEATURES)
+
+
+@lean_kernel
+def _encode_candidates(
+    start,
+    stop,
+    cs,
+    battery_j,
+    which,
+    nodes,
+    distances,
+    room,
+    ordered,
+    out,
+    rows,
+    beliefs,
+    reported,
+    receivers,
+    *network,
+):
+    """Fill out (B, n): BELIEF_FEATURES, then CANDIDATE_FEATURES of each candidate; and the candidates (B, K). Only in
+    the rows marked in `which`."""
+    c, network, width = cs[0], network_of(network), len(CANDIDATE_FEATURES)
+    chances, left, drops = room[0], room[1], room[2]
+    for b in range(start, stop):
+        if not which[b]:
+            continue
+        m, p, standing = beliefs[b].predicted_mean, beliefs[b].predicted_cov, network.row[b]
+        find_candidates(network, b, m[0], m[2], c.ring_m, nodes[b], distances[b])
+        f = out[b]
+        ex, ey = describe_belief(b, rows, beliefs, reported, receivers, network, nodes[b], distances[b], c, f[:G])
+        f[G:] = 0.0
+        sensors, members = Sensors(network.positions[b], receivers[b]), network.members[b]
+        fill_chances(sensors, nodes[b], m, p, c, chances[b])
+        for k in range(nodes.shape[1]):
+            node, g = nodes[b, k], f[G + k * width : G + (k + 1) * width]
+            if node < 0:
+                g[2] = BOUND
+                continue
+            g[2] = distances[b, k] / c.radius_m
+            g[7] = network.battery[b, node] / battery_j
+            describe_candidate(
+                node, chances[b, k], standing.head, members, standing.n_members, sensors, m, p, ex, ey, c, g
+            )
+        order_row(sensors, standing.head, m, p, 0.0, nodes[b], chances[b], c, left[b], ordered[b], drops[b])
+        describe_merit(nodes[b], ordered[b], drops[b], np.sqrt(p[0, 0] + p[2, 2] + 1e-12), width, f[G:])
+        clip(f)
+
+
+@lean_kernel
+def _encode_menu(
+    start,
+    stop,
+    cs,
+    typical_mj,
+    by,
+    units,
+    which,
+    nodes,
+    distances,
+    room,
+    ordered,
+    out,
+    rows,
+    beliefs,
+    reported,
+    receivers,
+    *network,
+):
+    """Fill out (B, n): BELIEF_FEATURES, then ENTRY_FEATURES of each of the menu's entries; the candidates (B, K).
+    Only in the rows marked in `which`."""
+    c, network, width = cs[0], network_of(network), len(ENTRY_FEATURES)
+    chances, left, drops, later = room[0], room[1], room[2], room[3]
+    for b in range(start, stop):
+        if not which[b]:
+            continue
+        m, p, standing = beliefs[b].predicted_mean, beliefs[b].predicted_cov, network.row[b]
+        sensors = Sensors(network.positions[b], receivers[b])
+        members, lam = network.members[b], rows[b].lam
+        find_candidates(network, b, m[0], m[2], c.ring_m, nodes[b], distances[b])
+        f = out[b]
+        way = describe_belief(b, rows, beliefs, reported, receivers, network, nodes[b], distances[b], c, f[:G])
+        known, numbers = (nodes[b], chances[b], later[b]), (lam, units[b], typical_mj)
+        foresee(sensors, known, m, p, c)
+        describe_standing(sensors, standing, members, known, m, p, way, numbers, c, f[G : G + width])
+        for rule in range(3):
+            given = standing.head, m, p, lam, nodes[b], chances[b], c
+            leader = rank_row(by, rule, sensors, *given, left[b], ordered[b], drops[b])
+            first = G + width + rule * GROUP * width
+            given = known, ordered[b], leader, m, p, way, numbers, c
+            describe_entries(sensors, standing, members, *given, width, f[first : first + GROUP * width])
+        clip(f)
+
+
+class CandidatesObservation:
+    """Flat Box float32: BELIEF_FEATURES, then CANDIDATE_FEATURES of the K living nodes nearest to the prediction."""
+
+    features = CANDIDATE_FEATURES
+
+    def __init__(self, scenario: Scenario, order: str, candidates: int, threads: int = 1):
+        self.shape = (candidates, len(self.features))
+        self.space = spaces.Box(-BOUND, BOUND, (G + candidates * self.shape[1],), np.float32)
+        self._candidates, self._ring_m, self._threads = candidates, scenario.ring_m, threads
+        self._scenario, self._constants = scenario, constants(scenario)
+
+    def encode(self, view: View) -> np.ndarray:
+        """(B, n) float32, fresh."""
+        rows, candidates = len(view.row), self._candidates
+        view.remember_nearest(np.empty((rows, candidates), np.int64), np.empty((rows, candidates)), self._ring_m)
+        return self._fill(np.empty((rows, *self.space.shape), np.float32), view, np.ones(rows, bool))
+
+    def renew(self, view: View, rows, before: View, last) -> np.ndarray:
+        """What `encode` gives, for less where few rows have changed.
+
+        Args:
+            rows: (B,) bool, which have changed since `last` was encoded from the view `before`.
+        """
+        view.remember_nearest(*(array.copy() for array in before.nearest(self._candidates, self._ring_m)), self._ring_m)
+        return self._fill(last.copy(), view, rows)
+
+    def _fill(self, out, view: View, rows):
+        return self._run(_encode_candidates, (self._scenario.radio.battery_j,), out, view, rows)
+
+    def _run(self, kernel, numbers, out, view: View, rows):
+        nodes, distances = view.nearest(self._candidates, self._ring_m)
+        room = rows, nodes, distances, np.empty((4, *nodes.shape)), np.empty(nodes.shape, np.int64), out
+        seen = view.row, view.belief, view.reports.count, view.receivers, *view.network.arrays()
+        over_rows(kernel, len(rows), threads_for(rows, self._threads), self._constants, *numbers, *room, *seen)
+        return out
+
+
+class MenuObservation(CandidatesObservation):
+    """Flat Box float32: BELIEF_FEATURES, then ENTRY_FEATURES of each entry of the menu: what it promises."""
+
+    features = ENTRY_FEATURES
+
+    def __init__(self, scenario: Scenario, order: str, candidates: int, threads: int = 1):
+        super().__init__(scenario, order, candidates, threads)
+        self.shape = (MENU_ENTRIES, len(self.features))
+        self.space = spaces.Box(-BOUND, BOUND, (G + MENU_ENTRIES * self.shape[1],), np.float32)
+        self._order = order
+
+    def _fill(self, out, view: View, rows):
+        numbers = self._scenario.typical_energy_mj, ORDERS.index(self._order), self._scenario.typical_cost(view.lam)
+        return self._run(_encode_menu, numbers, out, view, rows)
+
+
+class DictObservation:
+    """The same features under names: belief (19,), candidates (K, 11), and lam (1,) [m/mJ]."""
+
+    def __init__(self, scenario: Scenario, order: str, candidates: int, threads: int = 1):
+        self._flat = CandidatesObservation(scenario, order, candidates, threads)
+        high = max(scenario.lam_range[1], 1.0)
+        self.space = spaces.Dict(
+            {
+                "belief": spaces.Box(-BOUND, BOUND, (G,), np.float32),
+                "candidates": spaces.Box(-BOUND, BOUND, self._flat.shape, np.float32),
+                "lam": spaces.Box(0.0, high, (1,), np.float32),
+            }
+        )
+
+    def encode(self, view: View) -> dict[str, np.ndarray]:
+        """A dict of (B, ...) float32, fresh."""
+        flat = self._flat.encode(view)
+        return {
+            "belief": flat[:, :G].copy(),
+            "candidates": flat[:, G:].reshape(len(flat), *self._flat.shape).copy(),
+            "lam": np.minimum(view.lam[:, None].astype(np.float32), self.space["lam"].high[0]),
+        }
+
+    def renew(self, view: View, rows, before: View, last) -> dict[str, np.ndarray]:
+        """All of it."""
+        return self.encode(view)
+
+
+class ViewObservation:
+    """Everything a network could know, as float64: enough for every hand-written policy (`View.from_arrays`)."""
+
+    def __init__(self, scenario: Scenario, order: str, candidates: int, threads: int = 1):
+        nodes, side, far = scenario.field.nodes, max(scenario.field.room_m), 1e9
+
+        def box(low, high, *shape):
+            return spaces.Box(low, high, shape, np.float64)
+
+        self.space = spaces.Dict(
+            {
+                "period": spaces.Discrete(scenario.periods + 1),
+                "lam": box(0.0, max(scenario.lam_range[1], 1.0), 1),
+                "luck": spaces.Box(0, 2**32 - 1, (1,), np.int64),
+                "log_miss": box(-far, 0.0, 1),
+                "mean": box(-far, far, 4),
+                "cov": box(-far, far, 4, 4),
+                "predicted_mean": box(-far, far, 4),
+                "predicted_cov": box(-far, far, 4, 4),
+                "positions": box(0.0, side, nodes, 2),
+                "battery": box(0.0, scenario.radio.battery_j, nodes),
+                "head": spaces.Discrete(nodes + 1, start=-1),
+                "member": spaces.Box(0, 1, (nodes,), np.int8),
+                "detected": spaces.Box(0, 1, (nodes,), np.int8),
+                "measured": box(-far, far, nodes, 2),
+            }
+            | (self._of_receivers(box, nodes, far) if scenario.hears else {})
+            | ({"bitmap": spaces.Box(0, 1, (nodes,), np.int8)} if scenario.binary else {})
+        )
+
+    @staticmethod
+    def _of_receivers(box, nodes: int, far: float) -> dict:
+        shapes = {"latest_db": (nodes,), "gradient": (nodes, 2), "variance": (nodes,)}
+        return {name: box(-far, far, *shape) for name, shape in shapes.items()}
+
+    def encode(self, view: View) -> dict[str, np.ndarray]:
+        """A dict of (B, ...) arrays, fresh."""
+        return view.as_arrays()
+
+    def renew(self, view: View, rows, before: View, last) -> dict[str, np.ndarray]:
+        """All of it."""
+        return self.encode(view)
+
+
+OBSERVATIONS = {
+    "candidates": CandidatesObservation,
+    "menu": MenuObservation,
+    "dict": DictObservation,
+    "view": ViewObservation,
+}
+
+
+def make_observation(name: str, scenario: Scenario, order: str, candidates: int, threads: int = 1):
+    """An observation by name.
+
+    Raises:
+        ValueError: for an unknown name.
+    """
+    if name not in OBSERVATIONS:
+        raise ValueError(f"observation {name!r} is unknown: {suggest(name, OBSERVATIONS)}")
+    return OBSERVATIONS[name](scenario, order, candidates, threads)

@@ -1,0 +1,57 @@
+"""Rewards: minus (error + lam * energy), in metres; or minus each of the two, for learners of several objectives."""
+
+from functools import partial
+
+import numpy as np
+from gymnasium.spaces import Box
+
+from wsn_env.models.quantity import suggest
+
+DISBELIEF = 3.0  # a true error so many times the believed one is no accident
+
+
+def error_cost(outcome):
+    """The mission's: the distance between estimate and target [m]."""
+    return outcome["error_m"]
+
+
+def belief_cost(outcome):
+    """The error that the belief expects, of much lower variance; the true one where the belief is plainly wrong [m].
+
+    For training only.
+    """
+    wrong = outcome["error_m"] > DISBELIEF * outcome["posterior_rms_m"]
+    return np.where(wrong, outcome["error_m"], outcome["believed_error_m"])
+
+
+def vector_reward(outcome, lam):
+    """MO-Gymnasium's: [-error in m, -energy in mJ], (..., 2) float32; the weight (1, lam) makes the mission's of it.
+
+    A fresh array at each call, for MO-Gymnasium's wrappers write into it.
+    """
+    return -np.stack([outcome["error_m"], outcome["energy_mj"]], axis=-1).astype(np.float32)
+
+
+COSTS = {"error": error_cost, "belief": belief_cost}
+VECTOR = "vector"
+REWARDS = (*COSTS, VECTOR)
+
+
+def make_reward(name: str):
+    """reward(outcome, lam) for one of REWARDS; `outcome` has the fields of OUTCOME by name, arrays or numbers.
+
+    Raises:
+        ValueError: for an unknown name.
+    """
+    if name not in REWARDS:
+        raise ValueError(f"reward {name!r} is unknown: {suggest(name, REWARDS)}")
+    return vector_reward if name == VECTOR else partial(_reward, COSTS[name])
+
+
+def reward_space(name: str) -> Box | None:
+    """The space of one row's vector reward, as MO-Gymnasium asks for; None for a reward of one number."""
+    return Box(-np.inf, 0.0, (2,), np.float32) if name == VECTOR else None
+
+
+def _reward(cost, outcome, lam):
+    return -(cost(outcome) + lam * outcome["energy_mj"])

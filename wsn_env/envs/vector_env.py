@@ -1,0 +1,257 @@
+"""The native vector environment: a World with B rows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+
+from wsn_env.compiled import draws
+from wsn_env.envs.interface import Interface, Settings
+from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera
+from wsn_env.scenario import Scenario
+from wsn_env.simulation.bound import Bound, bound_kind
+from wsn_env.simulation.state import State
+from wsn_env.simulation.view import View
+from wsn_env.simulation.world import World
+
+
+class ClusterVectorEnv(gym.vector.VectorEnv):
+    """B fields at once. Row i is bit-identical to a ClusterEnv with seed + i, in all three autoreset modes.
+
+    Args:
+        num_envs: B.
+        autoreset_mode: "NextStep" (Gymnasium's default), "SameStep", or "Disabled": then rows are started anew by
+            `reset(options={"reset_mask": (B,) bool})`.
+        threads: cores to share a large batch; None: all that the process may use. No bit depends on it.
+        The rest: as ClusterEnv. A vector reward has the shape (B, 2); `reward_space` and `reward_dim` are of one row.
+    """
+
+    metadata = {"render_modes": list(RENDER_MODES), "render_fps": FPS, "autoreset_mode": AutoresetMode.NEXT_STEP}
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        scenario: str | Scenario = "PreDC-v0",
+        action: str = "menu",
+        observation: str = "candidates",
+        reward: str = "error",
+        order: str = "nearest",
+        candidates: int = Settings.candidates,
+        render_mode: str | None = None,
+        frame_px: int = 600,
+        fast: bool = False,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        threads: int | None = None,
+        **overrides,
+    ):
+        if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
+            raise ValueError(f"num_envs = {num_envs!r}: must be a whole number, at least 1")
+        self.num_envs = int(num_envs)
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = type(self).metadata | {"autoreset_mode": self.autoreset_mode}
+        self.render_mode = render_mode
+        self.scenario = Scenario.of(scenario, **overrides)
+        self._camera = None if render_mode is None else Camera(self.scenario, render_mode, frame_px)
+        self.world = World(self.scenario, threads, fast)
+        settings = Settings(action, observation, reward, order, candidates)
+        self.interface = Interface(self.scenario, settings, self.world.threads)
+        self.single_action_space = self.interface.action.space
+        self.single_observation_space = self.interface.observation.space
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        if self.interface.reward_space is not None:
+            self.reward_space, self.reward_dim = self.interface.reward_space, 2
+        self._generators: list[np.random.Generator | None] = [None] * num_envs
+        self._state: State | None = None
+        self._view: View | None = None
+        self._last: Any = None  # observation
+        self._squares = np.zeros(num_envs)
+        self._detections = np.zeros(num_envs, dtype=np.int64)
+        self._ended = np.zeros(num_envs, dtype=bool)
+        self._bound = None
+        if bound_kind(self.scenario) != "none":
+            self._bound = Bound(self.scenario, self.num_envs, self.world.threads)
+
+    def reset(self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None):
+        """New episodes, in the rows of options["reset_mask"] only where it is given.
+
+        Args:
+            seed: an int seeds row i with seed + i; a list seeds each row, None leaves its generator going.
+        """
+        rows = self._rows_to_reset(options)
+        if seed is None or isinstance(seed, int):
+            seeds = [None if seed is None else seed + i for i in range(self.num_envs)]
+        else:
+            seeds = list(seed)
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"seed has {len(seeds)} entries: must have one for each of the {self.num_envs} rows")
+        for i in np.flatnonzero(rows):
+            if seeds[i] is not None or self._generators[i] is None:
+                self._generators[i] = seeding.np_random(seeds[i])[0]
+        if self._state is None:
+            self._state = self.world.allocate(self.num_envs)
+        info = self._restart(rows)
+        self._show()
+        return self._observe(rows), _masked(info, rows)
+
+    def _rows_to_reset(self, options) -> np.ndarray:
+        mask = (options or {}).get("reset_mask")
+        if mask is None:
+            return np.ones(self.num_envs, dtype=bool)
+        good = isinstance(mask, np.ndarray) and mask.shape == (self.num_envs,) and mask.dtype == bool and mask.any()
+        if not good or (self._state is None and not mask.all()):
+            raise ValueError(
+                f"options['reset_mask'] = {mask!r}: must be a NumPy bool array of shape ({self.num_envs},) with at"
+                " least one True, after a reset of all rows"
+            )
+        return mask
+
+    def _restart(self, rows: np.ndarray) -> dict[str, np.ndarray]:
+        """Begin episodes in some rows; gives the info, which is theirs alone."""
+        keys = np.zeros(self.num_envs, np.uint64)
+        for i in np.flatnonzero(rows):
+            keys[i] = draws.episode_key(self._generators[i])
+        self._state, outcome = self.world.restart(self._state, rows, keys, donate=True)
+        self._squares[rows] = 0.0
+        self._detections[rows] = 0
+        self._ended = self._ended & ~rows
+        info = self.interface.judge(outcome.row, self._state.lam)[1]
+        if self._bound is not None:
+            info["bound_m"] = self._bound.begin(self._state, rows)
+        if self._camera is not None:
+            self._camera.begin(self._state, outcome, rows)
+        return info
+
+    def step(self, actions):
+        """One period for every row; ended rows start anew as the autoreset mode says."""
+        if self._state is None:
+            raise gym.error.ResetNeeded("call reset() before step()")
+        anew = self._ended
+        begins = anew.any()
+        if begins and self.autoreset_mode == AutoresetMode.DISABLED:
+            raise gym.error.ResetNeeded(
+                f"rows {np.flatnonzero(anew).tolist()} have ended: reset them with options={{'reset_mask': ...}}"
+            )
+        cluster = self.interface.action.cluster(_stacked(actions), self._view)
+        self._state, outcome = self.world.step(self._state, cluster, donate=True)
+        reward, info = self.interface.judge(outcome.row, self._state.lam)
+        self._squares += np.where(self._state.period > self.scenario.unscored, outcome.error_m * outcome.error_m, 0.0)
+        self._detections += outcome.detections
+        if self._bound is not None:
+            info["bound_m"] = self._bound.advance(self._state, outcome)
+        if self._camera is not None:
+            self._camera.add(self._state, outcome)
+        if begins:  # next-step mode: these rows only begin
+            reward[anew] = 0.0
+            _overwrite(info, self._restart(anew), anew)
+        truncated = self._state.period >= self.scenario.periods
+        terminated = np.zeros(self.num_envs, dtype=bool)
+        ends = truncated.any()
+        if ends and self.autoreset_mode == AutoresetMode.SAME_STEP:
+            return self._same_step(reward, terminated, truncated, info)
+        self._ended = truncated.copy()
+        self._show()
+        infos = _masked(info)
+        if ends:
+            infos |= _masked(self._episode_info(truncated), truncated)
+        return self._observe(), reward, terminated, truncated, infos
+
+    def _episode_info(self, rows: np.ndarray) -> dict[str, np.ndarray]:
+        """What sums up an episode, of the rows that end."""
+        periods = self.scenario.periods
+        info = {"episode_rms_m": np.sqrt(self._squares / self.scenario.scored), "antnp": self._detections / periods}
+        if self._bound is not None:
+            info["episode_bound_m"] = self._bound.episode_m()
+            if self._bound.kind == "bound":
+                info["episode_floor_m"] = self._bound.floor_m(self._state, rows)
+        return info
+
+    def _same_step(self, reward, terminated, truncated, info):
+        """Begin the ended rows within the step; their last observation and info go to final_obs and final_info."""
+        last = self._observe()
+        final = np.full(self.num_envs, None, dtype=object)
+        for i in np.flatnonzero(truncated):
+            final[i] = {name: value[i] for name, value in last.items()} if isinstance(last, dict) else last[i]
+        infos = {"final_obs": final, "_final_obs": truncated.copy()}
+        infos["final_info"] = _masked(info | self._episode_info(truncated), truncated)
+        infos["_final_info"] = truncated.copy()
+        _overwrite(info, self._restart(truncated), truncated)
+        self._show()
+        infos |= _masked(info)
+        return self._observe(truncated), reward, terminated, truncated, infos
+
+    @property
+    def lam(self) -> np.ndarray:
+        """(B,) the present episodes' trade-offs [m/mJ]."""
+        return self._state.lam
+
+    @property
+    def view(self) -> View:
+        """What hand-written policies see now, all rows: `policy.act(envs.view)` is their choice."""
+        if self._view is None:
+            raise gym.error.ResetNeeded("call reset() first")
+        return self._view
+
+    def action_masks(self) -> np.ndarray:
+        """(B, n) bool: which entries of each row's action make sense now."""
+        return self.interface.action.masks(self.view)
+
+    def render(self):
+        """A tuple of B frames (frame_px, frame_px, 3) uint8; in "human" mode None: reset and step show one window."""
+        if self._camera is None or self._state is None:
+            gym.logger.warn("render() needs render_mode='rgb_array' or 'human' and a reset environment")
+            return None
+        return self._camera.frames(self._state) if self.render_mode == "rgb_array" else None
+
+    def close_extras(self, **kwargs):
+        """Close the window, if there is one."""
+        if self._camera is not None:
+            self._camera.close()
+
+    def _show(self) -> None:
+        if self._camera is not None:
+            self._camera.show(self._state)
+
+    def _observe(self, rows: np.ndarray | None = None):
+        """The observation of all rows, of which only `rows` have changed since the last."""
+        before, self._view = self._view, View.of(self._state)
+        if rows is None or before is None or rows.all():
+            observation = self.interface.observation.encode(self._view)
+        else:
+            observation = self.interface.observation.renew(self._view, rows, before, self._last)
+        self._last = observation.copy()  # whoever gets it may write into it
+        return observation
+
+
+def _stacked(actions):
+    """A dict of arrays from a list of dicts, as policies' predict() gives them; anything else as it is."""
+    if isinstance(actions, (list, tuple, np.ndarray)) and len(actions) and isinstance(actions[0], dict):
+        return {name: np.stack([one[name] for one in actions]) for name in actions[0]}
+    return actions
+
+
+def _masked(info: dict[str, np.ndarray], rows: np.ndarray | None = None) -> dict[str, np.ndarray]:
+    """Gymnasium's form of a vector info: zeros where a row has none, and a mask under "_name".
+
+    Args:
+        rows: (B,) bool, who has one; None: all have, and their arrays are taken as they are.
+    """
+    if rows is None:
+        mask = np.ones(len(info["error_m"]), dtype=bool)
+        return info | {f"_{name}": mask for name in info}
+    out = {}
+    for name, value in info.items():
+        out[name] = value.copy()
+        out[name][~rows] = 0
+        out[f"_{name}"] = rows.copy()
+    return out
+
+
+def _overwrite(info: dict[str, np.ndarray], other: dict[str, np.ndarray], rows: np.ndarray) -> None:
+    for name, value in other.items():
+        info[name][rows] = value[rows]

@@ -1,0 +1,217 @@
+"""Comparison of policies: paired rollouts over common seeds, intervals, tables, files.
+
+Every policy meets the same fields, tracks, detections and noises, so that differences are taken episode by episode.
+Work goes in blocks of 50 seeds, whatever the machine: the rows are the same to the byte. Finished blocks are kept
+beside the result, and a run that was stopped continues from them. A policy that does not look at lam plays its episodes
+once; at every other lam only the return is another.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from wsn_env.evaluation.files import replacing
+from wsn_env.evaluation.intervals import Summary
+from wsn_env.evaluation.kept_blocks import KeptBlocks
+from wsn_env.evaluation.policies import Policy, named_policies
+from wsn_env.evaluation.progress import Progress
+from wsn_env.evaluation.rollout import BLOCK, Block, Engine, at_lam, evaluation_seeds, in_this_process
+from wsn_env.evaluation.versions import versions
+from wsn_env.models.quantity import suggest
+from wsn_env.scenario import Scenario
+from wsn_env.simulation.bound import bound_kind
+
+COLUMNS = (
+    "policy scenario lam episode seed periods return error_m rms_m energy_mj members handovers searches lost"
+    " bound_m floor_m anees"
+).split()
+MEANS = ("return", "rms_m", "error_m", "energy_mj", "members", "handovers", "searches", "lost")
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """One row per (policy, lam, episode), as written to evaluation.csv."""
+
+    scenario: Scenario
+    policies: tuple[str, ...]
+    lams: tuple[float, ...]
+    episodes: int
+    seed: int
+    rows: list[dict]
+
+    @property
+    def middle_lam(self) -> float:
+        """The one that pictures are drawn at."""
+        return sorted(self.lams)[len(self.lams) // 2]
+
+    @cached_property
+    def _rows_of(self) -> dict[tuple[str, float], list[dict]]:
+        found: dict[tuple[str, float], list[dict]] = {}
+        for row in self.rows:
+            found.setdefault((row["policy"], row["lam"]), []).append(row)
+        return found
+
+    def values(self, policy: str, lam: float, column: str) -> np.ndarray:
+        """(episodes,) in the order of the seeds, so that two policies' values are pairs."""
+        if (policy, lam) not in self._rows_of:
+            lams = ", ".join(f"{each:g}" for each in self.lams)
+            raise ValueError(f"policy {policy!r} at lam = {lam!r}: compared were {', '.join(self.policies)} at {lams}")
+        return np.array([row[column] for row in self._rows_of[policy, lam]])
+
+    def summary(self, policy: str, lam: float) -> dict[str, Summary]:
+        """Means with intervals of the quantities in MEANS."""
+        return {column: Summary.of(self.values(policy, lam, column)) for column in MEANS}
+
+    def rms_over_bound(self, policy: str, lam: float) -> Summary | None:
+        """Root of the mean squared error over the mean squared bound, of all episodes; None: there is no bound."""
+        if bound_kind(self.scenario) == "none":
+            return None
+        return Summary.of_root_ratio(*(self.values(policy, lam, column) ** 2 for column in ("rms_m", "bound_m")))
+
+    def floor_m(self) -> float | None:
+        """Root of the mean squared floor, the same for every policy; None: there is no bound."""
+        if bound_kind(self.scenario) == "none":
+            return None
+        return float(np.sqrt(np.mean(self.values(self.policies[0], self.lams[0], "floor_m") ** 2)))
+
+    def difference(self, policy: str, reference: str, lam: float, column: str = "return") -> Summary:
+        """Paired difference policy - reference over the common episodes."""
+        return Summary.of(self.values(policy, lam, column) - self.values(reference, lam, column))
+
+    def ranked(self, lam: float) -> list[str]:
+        """Policies, the best mean return first."""
+        return sorted(self.policies, key=lambda policy: -self.values(policy, lam, "return").mean())
+
+    def families(self) -> list[str]:
+        """Stems of the policies whose names differ only by a number at the end: "nearest" of nearest0, nearest1, ..."""
+        stems = [stem_of(policy) for policy in self.policies if stem_of(policy) != policy]
+        return [stem for stem in dict.fromkeys(stems) if stems.count(stem) > 1]
+
+    def family_name(self, stem: str) -> str:
+        """ "nearest0..8", by the least and the largest number that was compared."""
+        numbers = [int(policy.removeprefix(stem)) for policy in self.policies if policy != stem == stem_of(policy)]
+        return f"{stem}{min(numbers)}..{max(numbers)}"
+
+    def best_of(self, stem: str, lam: float) -> str:
+        """The member of a numbered family with the best mean return: the best in hindsight.
+
+        Raises:
+            ValueError: for a stem without members, or a lam that was not compared at.
+        """
+        members = [policy for policy in self.policies if policy != stem and stem_of(policy) == stem]
+        if not members:
+            raise ValueError(f"family {stem!r} has no members: {suggest(stem, self.families())}")
+        if lam not in self.lams:
+            raise ValueError(f"lam = {lam:g}: must be one of {', '.join(f'{each:g}' for each in self.lams)}")
+        return max(members, key=lambda policy: self.values(policy, lam, "return").mean())
+
+    def save(self, out: str | Path) -> None:
+        """Write evaluation.csv and evaluation.json into a folder, each whole or not at all."""
+        out = Path(out)
+        out.mkdir(parents=True, exist_ok=True)
+        with replacing(out / "evaluation.csv") as path, open(path, "w", newline="") as file:
+            writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(self.rows)
+        means = [
+            {"policy": policy, "lam": lam}
+            | {column: vars(value) for column, value in self.summary(policy, lam).items()}
+            | {f"return_minus_{self.policies[0]}": vars(self.difference(policy, self.policies[0], lam))}
+            | self._against_the_bound(policy, lam)
+            for lam in self.lams
+            for policy in self.policies
+        ]
+        with replacing(out / "evaluation.json") as path:
+            path.write_text(json.dumps(self.settings() | {"versions": versions(), "means": means}, indent=1))
+
+    def _against_the_bound(self, policy: str, lam: float) -> dict:
+        ratio = self.rms_over_bound(policy, lam)
+        return (
+            {} if ratio is None else {f"rms_over_{bound_kind(self.scenario)}": vars(ratio), "floor_m": self.floor_m()}
+        )
+
+    def settings(self) -> dict:
+        """What was asked for."""
+        return _settings(self.scenario, self.policies, self.lams, self.episodes, self.seed)
+
+
+def stem_of(policy: str) -> str:
+    """A policy's name without the number at its end."""
+    return policy.rstrip("0123456789")
+
+
+def evaluate(
+    policies: Sequence[str] | dict[str, Policy],
+    scenario: Scenario,
+    lams: Sequence[float] | None = None,
+    episodes: int = 100,
+    seed: int = 0,
+    keep: str | Path | None = None,
+    progress: Progress | None = None,
+    threads: int | None = None,
+    engine: Engine | None = None,
+) -> Evaluation:
+    """Paired comparison of policies.
+
+    Args:
+        policies: as for `named_policies`, or name -> Policy. The first is the reference of differences. One
+            with `sees_lam = False` plays once for all lams.
+        scenario: what they act in.
+        lams: the trade-offs [m/mJ]; None: the scenario's, which must then be a single one.
+        episodes: common random episodes for each policy and lam.
+        seed: another seed, other episodes; training never meets any of them.
+        keep: a folder for finished blocks, so that a stopped run continues; None: none are kept.
+        progress: called with (blocks done, of, what).
+        threads: as World's.
+        engine: where the blocks are played; None: in this process. The rows do not depend on it.
+
+    Raises:
+        ValueError: for an unknown policy, or seed and episodes out of range.
+    """
+    if lams is None and isinstance(scenario.lam, (tuple, list)):
+        raise ValueError(f"scenario.lam = {scenario.lam}: name the lams to compare at, one number each")
+    lams = tuple(dict.fromkeys(map(float, [scenario.lam] if lams is None else lams)))
+    if not policies or not lams:
+        raise ValueError("policies and lams must name at least one each")
+    named = policies if isinstance(policies, dict) else named_policies(policies, scenario)
+    seeds = evaluation_seeds(seed, episodes)
+    kept = KeptBlocks(keep, _settings(scenario, named, lams, episodes, seed), list(named.values()))
+    blocks: dict[tuple, Block] = {}
+    for lam in lams:
+        at_this = scenario.override(lam=lam)
+        for name, policy in named.items():
+            seen = lam if getattr(policy, "sees_lam", True) else None
+            for number in range(-(-episodes // BLOCK)):
+                own = seeds[number * BLOCK : (number + 1) * BLOCK]
+                blocks.setdefault((name, seen, number), Block(name, seen, number, policy, at_this, own))
+    missing = [block for block in blocks.values() if not kept.has(block)]
+    for done, (block, measured) in enumerate((engine or in_this_process(threads))(missing), len(blocks) - len(missing)):
+        kept.put(block, measured)
+        if progress:
+            progress(done + 1, len(blocks), block.name if block.lam is None else f"{block.name}, lam {block.lam:g}")
+    rows = []
+    for lam in lams:
+        for name, policy in named.items():
+            seen = lam if getattr(policy, "sees_lam", True) else None
+            measured = [one for number in range(-(-episodes // BLOCK)) for one in kept.get(name, seen, number)]
+            for episode, values in enumerate(at_lam(measured, lam)):
+                row = {"policy": name, "scenario": scenario.name, "episode": episode, "seed": seeds[episode]} | values
+                rows.append({column: row[column] for column in COLUMNS})
+    return Evaluation(scenario, tuple(named), lams, episodes, seed, rows)
+
+
+def _settings(scenario: Scenario, policies, lams, episodes: int, seed: int) -> dict:
+    return {
+        "scenario": scenario.as_dict(),
+        "policies": list(policies),
+        "lams": list(lams),
+        "episodes": episodes,
+        "seed": seed,
+    }

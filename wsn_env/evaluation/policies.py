@@ -1,0 +1,155 @@
+"""Policies by name, from every installed package's entry points in the group `wsn_env.policies`, and from files.
+
+A package of one's own adds `my_rule = "my_package.rules:MyRule"` there: a callable that takes the Scenario and returns
+an object with `act(view) -> Cluster`.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from importlib.metadata import EntryPoint, entry_points
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from typing import Protocol
+
+from wsn_env.models.quantity import parse_overrides, suggest
+from wsn_env.scenario import Scenario
+from wsn_env.simulation.state import Cluster
+from wsn_env.simulation.view import View
+
+GROUP = "wsn_env.policies"
+OF_FILES = "wsn_env_policies_of_file_"  # so begin the names of modules that are files given by path
+
+
+class Policy(Protocol):
+    """Chooses clusters, batch-first; it must not keep anything between calls (the view holds what has to be known)."""
+
+    def act(self, view: View) -> Cluster:
+        """The clusters of the next period."""
+
+
+def policy_names() -> list[str]:
+    """Every policy that can be made by name."""
+    return sorted({point.name for point in entry_points(group=GROUP)})
+
+
+def make_policy(name: str, scenario: Scenario, **parameters) -> Policy:
+    """A policy by name, one of your own from a file, or a learned one from the policy.json that train.py saved.
+
+    Args:
+        name: an entry point's name, one that ends in a number ("nearest3": n = 3), or "FILE.py:Class", with parameters
+            after a colon if any ("pre_dc:theta=0.8,phi0_m=3", "mine.py:TwoBest:sharp_m=2"); or a path to a policy.json
+            (or its folder).
+        scenario: what it will act in.
+        parameters: of the policy, for example `make_policy("pre_dc", scenario, theta=0.8)`.
+
+    Raises:
+        ValueError: for an unknown name, class or parameter.
+    """
+    file, own, rest = name.partition(".py:")
+    plain, colon, text = (rest if own else name).partition(":")
+    if own:
+        return _made(name, _class_in(Path(f"{file}.py"), plain), scenario, parameters | _given(colon, text))
+    point, number = _entry_point(plain)
+    if point is not None:
+        try:
+            made_by = point.load()
+        except (ImportError, AttributeError) as problem:
+            raise ValueError(f"policy {name!r}: its entry point {point.value!r} fails: {problem}") from None
+        return _made(name, made_by, scenario, parameters | number | _given(colon, text))
+    path = Path(name)
+    path = path / "policy.json" if path.is_dir() else path
+    if path.suffix == ".py":
+        raise ValueError(f"policy {name!r}: which class of it? {name}:CLASS")
+    if path.suffix == ".json" or len(path.parts) > 1:
+        return load_learned(path, scenario)
+    ways = "(or FILE.py:CLASS, or the path of a policy.json)"
+    raise ValueError(f"policy {name!r} is unknown: {suggest(name, policy_names())} {ways}")
+
+
+def named_policies(texts: Sequence[str], scenario: Scenario) -> dict[str, Policy]:
+    """Policies by label, from names, paths of saved policies, "FILE.py:Class", or "label=" and any of these.
+
+    Raises:
+        ValueError: for an unknown policy, or two with one label.
+    """
+    named: dict[str, Policy] = {}
+    for text in dict.fromkeys(texts):
+        if not isinstance(text, str):
+            raise ValueError(
+                f"policies: {type(text).__name__} is no name: give policies of your own as {{name: policy}}"
+            )
+        label, policy = _labelled(text, scenario)
+        if label in named:
+            raise ValueError(f"policies: {label!r} is there twice: labels must differ")
+        named[label] = policy
+    return named
+
+
+def _labelled(text: str, scenario: Scenario) -> tuple[str, Policy]:
+    """("ppo", policy) from "ppo=runs/mine/policy.json"; a name or a path alone is its own label."""
+    label, equals, source = text.partition("=")
+    labelled = equals and ":" not in label  # else parameters: quadrants:n=2
+    if labelled and not label:
+        raise ValueError(f"policies: {text!r} has no label before the =")
+    return (label, make_policy(source, scenario)) if labelled else (text, make_policy(text, scenario))
+
+
+def _entry_point(name: str) -> tuple[EntryPoint | None, dict[str, int]]:
+    """The entry point of a name, and the n of one that ends in a number: "nearest3" is `nearest` with n = 3."""
+    points = {point.name: point for point in entry_points(group=GROUP)}
+    if name in points:
+        return points[name], {}
+    stem = name.rstrip("0123456789")
+    return points.get(stem), {"n": int(name[len(stem) :])} if stem in points else {}
+
+
+def _given(colon: str, text: str) -> dict:
+    return parse_overrides(text.split(",")) if colon else {}
+
+
+def _made(name: str, made_by, scenario: Scenario, parameters: dict) -> Policy:
+    try:
+        policy = made_by(scenario=scenario, **parameters)
+    except TypeError as problem:
+        raise ValueError(f"policy {name!r}: cannot be made with a scenario and its parameters: {problem}") from problem
+    if not callable(getattr(policy, "act", None)):
+        raise ValueError(f"policy {name!r}: has no act(view)")
+    return policy
+
+
+def _class_in(path: Path, name: str):
+    """A class of a Python file, which is read once."""
+    if not path.is_file():
+        raise ValueError(f"policy {f'{path}:{name}'!r}: there is no file {path}")
+    file = str(path.resolve())
+    module_name = OF_FILES + path.stem
+    module = sys.modules.get(module_name)
+    if module is None or module.__file__ != file:
+        spec = spec_from_file_location(module_name, file)
+        module = sys.modules[module_name] = module_from_spec(spec)
+        spec.loader.exec_module(module)
+    if not hasattr(module, name):
+        known = [each for each, value in vars(module).items() if getattr(value, "__module__", None) == module_name]
+        raise ValueError(f"policy {f'{path}:{name}'!r}: the file has no such class: {suggest(name, known)}")
+    return getattr(module, name)
+
+
+def load_learned(path: Path, scenario: Scenario) -> Policy:
+    """A saved policy: its policy.json names the entry point of the kind that can read it."""
+    try:
+        kind = json.loads(path.read_text())["kind"]
+    except FileNotFoundError:
+        raise ValueError(f"policy {str(path)!r} does not exist") from None
+    except (ValueError, KeyError, TypeError, UnicodeDecodeError) as problem:
+        raise ValueError(f"{path} is not a saved policy: {problem!r}") from None
+    if kind not in policy_names():
+        raise ValueError(f"{path} is not a saved policy: its kind is {kind!r}, known are {', '.join(policy_names())}")
+    try:
+        return make_policy(kind, scenario, path=str(path))
+    except ValueError as problem:
+        if isinstance(problem.__cause__, TypeError):
+            raise ValueError(f"{path} is not a saved policy: its kind {kind!r} is not learned") from None
+        raise

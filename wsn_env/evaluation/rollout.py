@@ -1,0 +1,147 @@
+"""Episodes played and measured: by seed, as rows of a batch, in blocks of 50 whatever the machine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from wsn_env.compiled import draws
+from wsn_env.evaluation.policies import Policy
+from wsn_env.scenario import Scenario
+from wsn_env.simulation.bound import Bound, bound_kind
+from wsn_env.simulation.state import Cluster, Outcome, State
+from wsn_env.simulation.view import View
+from wsn_env.simulation.world import World
+
+BLOCK = 50
+FIRST_SEED, SEEDS_PER_RUN = 2**31, 10**5  # training seeds lie below FIRST_SEED
+
+
+def evaluation_seeds(seed: int, episodes: int) -> list[int]:
+    """The literal reset seeds of an evaluation; `gym.make(...).reset(seed=s)` replays episode s."""
+    if not 0 <= seed < 10**4:
+        raise ValueError(f"seed = {seed}: must be in 0..9999")
+    if not 1 <= episodes <= SEEDS_PER_RUN:
+        raise ValueError(f"episodes = {episodes}: must be in 1..{SEEDS_PER_RUN}")
+    return [FIRST_SEED + seed * SEEDS_PER_RUN + episode for episode in range(episodes)]
+
+
+def episodes(
+    policy: Policy, world: World, seeds: Sequence[int], begin: Callable[[State, Outcome], object] | None = None
+) -> Iterator[tuple[State, Outcome]]:
+    """Play one episode for each seed, a row each; gives state and outcome after every period.
+
+    `begin` is called with state and outcome before the first: those of `World.restart`.
+    """
+    keys = np.array([draws.key_of_seed(seed) for seed in seeds], dtype=np.uint64)
+    state, outcome = world.restart(world.allocate(len(keys)), np.ones(len(keys), bool), keys, donate=True)
+    if begin is not None:
+        begin(state, outcome)
+    for _ in range(world.scenario.periods):
+        cluster = _checked(policy.act(View.of(state)), policy, world.scenario.field.nodes)
+        state, outcome = world.step(state, cluster, donate=True)
+        yield state, outcome
+
+
+def _checked(cluster: Cluster, policy: Policy, nodes: int) -> Cluster:
+    """What a policy chose; the world would drop and count nodes that do not exist, here they are a mistake."""
+    if not isinstance(cluster, Cluster):
+        chose = type(cluster).__name__
+        raise ValueError(f"{type(policy).__name__}.act: returned a {chose}: must be a Cluster(head, members)")
+    highest = max(np.max(cluster.head), np.max(cluster.members, initial=-1))
+    if highest >= nodes:
+        raise ValueError(f"{type(policy).__name__}.act: chose node {highest}: must be below {nodes}")
+    return cluster
+
+
+def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict]:
+    """Play one episode for each seed and measure it.
+
+    Args:
+        policy: sees only views.
+        world: of a scenario with one lam.
+        seeds: reset seeds, one a row.
+
+    Returns: the measured columns of each episode, and the sums that its return is made of. `anees` is the mean of the
+    squared error over what the belief takes it to be, the trace of its position covariance: 1 where the filter is
+    honest, more where it is too sure.
+    """
+    scenario = world.scenario
+    sums = dict.fromkeys(("error", "square", "energy", "members", "handovers", "searches", "lost"), 0.0)
+    judged, ratios = np.zeros(len(seeds)), np.zeros(len(seeds))
+    bound = None if bound_kind(scenario) == "none" else Bound(scenario, len(seeds), world.threads)
+    for state, outcome in episodes(policy, world, seeds, bound and (lambda state, _: bound.begin(state))):
+        square, believed = outcome.error_m**2, outcome.posterior_rms_m**2
+        sums["error"] += outcome.error_m
+        if state.period[0] > scenario.unscored:
+            sums["square"] += square
+            judged += believed > 0
+            ratios += np.divide(square, believed, out=np.zeros(len(seeds)), where=believed > 0)
+        sums["energy"] += outcome.energy_mj
+        sums["members"] += outcome.members
+        sums["handovers"] += outcome.handover
+        sums["searches"] += outcome.searched
+        sums["lost"] += outcome.error_m > 2 * scenario.radius_m
+        if bound is not None:
+            bound.advance(state, outcome)
+    n = scenario.periods
+    columns = {
+        "lam": state.lam,
+        "periods": np.full(len(seeds), n),
+        "return": -(sums["error"] + state.lam * sums["energy"]),
+        "sum_error_m": sums["error"],
+        "sum_energy_mj": sums["energy"],
+        "error_m": sums["error"] / n,
+        "rms_m": np.sqrt(sums["square"] / scenario.scored),
+        "energy_mj": sums["energy"] / n,
+        "members": sums["members"] / n,
+        "handovers": sums["handovers"].astype(int),
+        "searches": sums["searches"].astype(int),
+        "lost": sums["lost"].astype(int),
+        "bound_m": np.full(len(seeds), "") if bound is None else bound.episode_m(),
+        "floor_m": np.full(len(seeds), "") if bound is None else bound.floor_m(state),
+        "anees": ratios / np.maximum(judged, 1),
+    }
+    return [{name: values[i].item() for name, values in columns.items()} for i in range(len(seeds))]
+
+
+def at_lam(measured: Sequence[dict], lam: float) -> list[dict]:
+    """The same episodes with the return at another lam: what `rollout` gives of a policy that does not look at it."""
+    return [
+        values | {"lam": lam, "return": -(values["sum_error_m"] + lam * values["sum_energy_mj"])} for values in measured
+    ]
+
+
+class Block(NamedTuple):
+    """Up to BLOCK episodes of a policy: what an engine plays at a time."""
+
+    name: str
+    lam: float | None  # that the policy sees; None: it does not look, and this serves all
+    number: int
+    policy: Policy
+    scenario: Scenario
+    seeds: list[int]
+
+
+Engine = Callable[
+    [Sequence[Block]], Iterator[tuple[Block, list[dict]]]
+]  # each with what `rollout` measured, as it comes
+
+
+def in_this_process(threads: int | None = None) -> Engine:
+    """Plays the blocks one after the other.
+
+    Args:
+        threads: as World's.
+    """
+
+    def play(blocks):
+        world = None
+        for block in blocks:
+            if world is None or world.scenario is not block.scenario:
+                world = World(block.scenario, threads)
+            yield block, rollout(block.policy, world, block.seeds)
+
+    return play

@@ -1,0 +1,35 @@
+"""The score of a policy from any toolkit, on the episodes of `evaluate`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from gymnasium.vector import VectorEnv
+
+from wsn_env.evaluation.rollout import evaluation_seeds
+
+
+def score(act: Callable, envs: VectorEnv, seed: int = 0) -> np.ndarray:
+    """Play one whole episode in every row: the first B of `evaluate(..., seed=seed)`, so that both are paired.
+
+    The reward of the environment and of its wrappers plays no part: a return is -sum(error + lam * energy), of the true
+    error.
+
+    Args:
+        act: observations of all rows -> their actions, called once a period. It may keep a memory: all rows begin and
+            end together.
+        envs: the native vector environment in any autoreset mode, wrapped or not; its B rows are the episodes.
+        seed: of the evaluation.
+
+    Returns: (B,).
+    """
+    observations, _ = envs.reset(seed=evaluation_seeds(seed, envs.num_envs))
+    lam, periods = envs.unwrapped.lam.copy(), envs.unwrapped.scenario.periods
+    errors, energies = np.zeros((2, envs.num_envs))
+    for _ in range(periods):
+        observations, _, _, _, info = envs.step(act(observations))
+        info = info.get("final_info", info)  # same-step mode has begun the next episodes by now
+        errors += info["error_m"]
+        energies += info["energy_mj"]
+    return -(errors + lam * energies)

@@ -1,0 +1,186 @@
+"""The cubature Kalman filter and its iterated form; Gaussian integrals by 2n points, n = 4.
+
+Arasaratnam & Haykin (2009): the mean of f over N(x, P) is that of f at x +- sqrt(n) l_j, l_j the columns of a square
+root of P. A measurement z = h(x) + noise is replaced by its best linear fit over the belief (statistical linear
+regression), z = H x + b + residual of covariance W + noise. The iterated form fits again about the belief just found
+(posterior linearisation; Garcia-Fernandez, Svensson, Morelande & Sarkka, 2015), and always corrects the *prior*: to
+correct the posterior once more would count the measurement twice. A linear measurement fits at once: both are then
+the Kalman filter.
+"""
+
+import numpy as np
+
+from wsn_env.compiled.kernels import kernel, over_rows, piece
+from wsn_env.filters.base import MomentTracker
+from wsn_env.models.physics import sensing
+from wsn_env.models.physics.constants import constants
+from wsn_env.models.physics.field import squared_distance
+from wsn_env.models.physics.motion import predict_moments
+from wsn_env.scenario import Scenario
+from wsn_env.simulation.state import Belief, Network, Reports
+
+ITERATIONS = 5  # at most
+TOLERANCE_M = 1e-3  # a shift of the position below this ends the iteration
+
+
+class _CubatureTracker(MomentTracker):
+    """Corrects with all reports of a period at once."""
+
+    iterations: int
+
+    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
+        self._constants, self._threads = constants(scenario), threads
+
+    def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
+        """Predict and correct every row, in place."""
+        rest = self.iterations, belief.row, network.positions, *reports[:3]
+        over_rows(_correct_rows, len(keys), self._threads, self._constants, *rest)
+
+
+class CKFTracker(_CubatureTracker):
+    """Cubature Kalman filter: one linear fit, over the prediction.
+
+    Own work: filterpy's CubatureKalmanFilter does not draw its points anew once the process noise is added.
+    """
+
+    iterations = 1
+
+
+class ICKFTracker(_CubatureTracker):
+    """Iterated cubature Kalman filter: at most ITERATIONS fits, until the position shifts by less than TOLERANCE_M."""
+
+    iterations = ITERATIONS
+
+
+@kernel
+def _correct_rows(start, stop, cs, iterations, beliefs, positions, count, node, value):
+    c = cs[0]
+    prior, prior_cov = np.empty(4), np.empty((4, 4))
+    for b in range(start, stop):
+        mean, cov = beliefs[b].mean, beliefs[b].cov
+        predict_moments(mean, cov, c.period_s, c.q, prior, prior_cov)
+        mean[:], cov[:] = prior, prior_cov
+        heard = count[b]
+        if heard == 0:
+            continue
+        told = _as_vector(value[b], heard, c)
+        for _ in range(iterations):
+            x, y = mean[0], mean[2]
+            slope, level, residual = _fit(mean, cov, positions[b], node[b], heard, c)
+            for i in range(len(told)):  # what is told beyond the fit at the prior
+                residual[i, i] += c.noise * c.noise
+                level[i] = told[i] - level[i]
+                for k in range(4):
+                    level[i] -= slope[i, k] * (prior[k] - mean[k])
+            _correct(prior, prior_cov, slope, level, residual, mean, cov)
+            if (mean[0] - x) ** 2 + (mean[2] - y) ** 2 < TOLERANCE_M**2:
+                break
+
+
+@piece
+def _as_vector(value, heard, c):
+    """The reports (m,): a strength each, or x and y each."""
+    if c.model == sensing.POSITION:
+        return value[:heard].copy().reshape(2 * heard)
+    return value[:heard, 0].copy()
+
+
+@piece
+def _expect(state, positions, node, heard, c, out):
+    """h(x): what these nodes measure but for noise, as `_as_vector` lays it out."""
+    for i in range(heard):
+        if c.model == sensing.POSITION:
+            out[2 * i], out[2 * i + 1] = state[0], state[2]
+        else:
+            out[i] = sensing.strength(squared_distance(positions, node[i], state[0], state[2]), c)
+
+
+@piece
+def _fit(mean, cov, positions, node, heard, c):
+    """Statistical linear regression of h over N(mean, cov), for m measured values.
+
+    With L the root of cov, z+_j and z-_j the values at mean +- 2 l_j, and D_j = (z+_j - z-_j) / 4, the covariance of
+    state and values is L D, so that H = (cov^-1 L D)' solves H L = D'.
+
+    Returns: H (m, 4); the mean value (m,); the residual's covariance (m, m): that of the values less H cov H' = D' D.
+    """
+    size = 2 * heard if c.model == sensing.POSITION else heard
+    root = cov.copy()
+    _factor(root)
+    values = np.empty((8, size))
+    for j in range(4):
+        _expect(mean + 2.0 * root[:, j], positions, node, heard, c, values[2 * j])
+        _expect(mean - 2.0 * root[:, j], positions, node, heard, c, values[2 * j + 1])
+    level = np.zeros(size)
+    for k in range(8):
+        level += values[k] / 8.0
+    slope = np.empty((size, 4))
+    for i in range(size):
+        for j in range(4):
+            slope[i, j] = 0.25 * (values[2 * j, i] - values[2 * j + 1, i])
+    residual = np.empty((size, size))
+    for i in range(size):
+        for k in range(i + 1):
+            total = 0.0
+            for j in range(8):
+                total += (values[j, i] - level[i]) * (values[j, k] - level[k]) / 8.0
+            for j in range(4):
+                total -= slope[i, j] * slope[k, j]
+            residual[i, k] = residual[k, i] = total
+    for i in range(size):  # H from D', from the last column on
+        for j in range(3, -1, -1):
+            for k in range(j + 1, 4):
+                slope[i, j] -= slope[i, k] * root[k, j]
+            slope[i, j] /= root[j, j]
+    return slope, level, residual
+
+
+@piece
+def _correct(prior, prior_cov, slope, innovation, noise, mean, cov):
+    """Kalman's correction of the prior; mean and cov are filled, innovation and noise used up.
+
+    S = H P H' + noise = L L'; with Y = L^-1 H P and e = L^-1 innovation it is x + Y' e and P - Y' Y.
+    """
+    size = len(innovation)
+    gain = np.zeros((size, 4))
+    for i in range(size):
+        for j in range(4):
+            for k in range(4):
+                gain[i, j] += slope[i, k] * prior_cov[k, j]
+    for i in range(size):
+        for j in range(i + 1):
+            for k in range(4):
+                noise[i, j] += gain[i, k] * slope[j, k]
+    _factor(noise)
+    mean[:], cov[:] = prior, prior_cov
+    for i in range(size):
+        for k in range(i):
+            innovation[i] -= noise[i, k] * innovation[k]
+            for j in range(4):
+                gain[i, j] -= noise[i, k] * gain[k, j]
+        innovation[i] /= noise[i, i]
+        for j in range(4):
+            gain[i, j] /= noise[i, i]
+        for j in range(4):
+            mean[j] += gain[i, j] * innovation[i]
+            for k in range(4):
+                cov[j, k] -= gain[i, j] * gain[i, k]
+    for j in range(4):
+        cov[j, j] = max(cov[j, j], 0.0)
+
+
+@piece
+def _factor(matrix):
+    """Cholesky's lower factor, in place, of the matrix in the lower half. A pivot lost to rounding becomes tiny."""
+    for j in range(len(matrix)):
+        matrix[:j, j] = 0.0
+        pivot = least = matrix[j, j]
+        for k in range(j):
+            pivot -= matrix[j, k] * matrix[j, k]
+        root = np.sqrt(max(pivot, 1e-14 * least, 1e-30))
+        matrix[j, j] = root
+        for i in range(j + 1, len(matrix)):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = total / root

@@ -1,0 +1,46 @@
+"""The cluster particle filter (Xiang & Guo, 2013, eqs. 9-15); its arithmetic stands in `kernels`."""
+
+from wsn_env.compiled import kernels as compiling
+from wsn_env.compiled.kernels import over_rows, threads_for
+from wsn_env.filters import kernels
+from wsn_env.models.physics.beacon import maps_of
+from wsn_env.models.physics.constants import constants
+from wsn_env.scenario import Scenario
+from wsn_env.simulation.state import Belief, Network, Reports
+
+
+class ParticleTracker:
+    """A bootstrap filter with systematic resampling at N_eff < 2P/3.
+
+    Fusion "joint": members send z and every particle is weighed with the product of the likelihoods. "pooled" (the
+    paper): particle i is weighed by member i mod m only, and the head pools the members' sums. A period without
+    reports only predicts.
+    """
+
+    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
+        self.particles = scenario.tracking.particles
+        self.threads = threads
+        self._filter_rows = compiling.fast(kernels.filter_rows) if fast else kernels.filter_rows
+        self._constants = constants(scenario)
+        self.maps = maps_of(scenario)
+        self._anywhere = scenario.tracking.velocity_s is not None and scenario.tracking.start != "known"
+
+    def start(self, keys, periods, rows, belief: Belief) -> None:
+        """Draw the clouds of the marked rows from N(mean, cov), in place; of walkers whose start is not known, from all
+        over the room."""
+        threads = threads_for(rows, self.threads)
+        if self._anywhere:
+            over_rows(kernels.scatter_rows, len(keys), threads, self._constants, keys, periods, rows, belief)
+            return
+        over_rows(kernels.spread_rows, len(keys), threads, keys, periods, rows, belief)
+
+    def relocate(self, keys, periods, rows, belief: Belief) -> None:
+        """Draw the positions of the marked rows' particles from N(mean, cov), in place; keep the velocities."""
+        threads = threads_for(rows, self.threads)
+        over_rows(kernels.relocate_rows, len(keys), threads, keys, periods, rows, belief)
+
+    def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
+        """Predict, weigh, read mean and covariance, resample, in place."""
+        arrays = *belief, *reports, *network.arrays()
+        known = self._constants, self.maps
+        over_rows(self._filter_rows, len(keys), self.threads, *known, keys, periods, resampled, *arrays)

@@ -1,0 +1,1 @@
+"""What training a scheduler takes: networks, adapters to the libraries, rewards, tuning."""

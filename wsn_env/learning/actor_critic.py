@@ -1,0 +1,105 @@
+"""stable-baselines3 policies whose actor scores entries: the torch twin of `EntryNetwork`."""
+
+from __future__ import annotations
+
+import torch
+from stable_baselines3.common.policies import ActorCriticPolicy
+from torch import nn
+
+from wsn_env.learning.network import EntryNetwork, FlatNetwork, Network
+
+
+class EntryActorCritic(nn.Module):
+    """Actor: `EntryNetwork`. Critic: a flat network of the whole observation, two layers of tanh; it only serves
+    training.
+
+    Args:
+        belief, entry: lengths of the observation's head and of each of its entries.
+        observation: its whole length.
+        outputs: 1: a logit for each entry (menu); 2: leading and being awake (subset).
+        actor, critic: units of the two hidden layers.
+    """
+
+    def __init__(
+        self,
+        belief: int,
+        entry: int,
+        observation: int,
+        outputs: int,
+        actor: tuple[int, int],
+        critic: tuple[int, int],
+    ):
+        super().__init__()
+        self.sizes = belief, entry, outputs
+        self.belief = nn.Linear(belief, actor[0])
+        self.entry = nn.Linear(entry, actor[0], bias=False)
+        self.hidden = nn.Linear(actor[0], actor[1])
+        self.score = nn.Linear(actor[1], outputs)
+        layers = [nn.Linear(observation, critic[0]), nn.Tanh(), nn.Linear(critic[0], critic[1]), nn.Tanh()]
+        self.critic = nn.Sequential(*layers, nn.Linear(critic[1], 1))
+        for layer in self.modules():
+            if isinstance(layer, nn.Linear):
+                gain = 0.01 if layer is self.score else 1.0 if layer is self.critic[-1] else 2**0.5
+                nn.init.orthogonal_(layer.weight, gain)
+                if layer.bias is not None:
+                    nn.init.zeros_(layer.bias)
+
+    def forward(self, observation):
+        """Logits and value, as stable-baselines3 takes them from an `mlp_extractor`."""
+        return self.forward_actor(observation), self.forward_critic(observation)
+
+    def forward_actor(self, observation):
+        """(B, logits)."""
+        belief, entry, outputs = self.sizes
+        entries = observation[:, belief:].reshape(len(observation), -1, entry)
+        if outputs > 1:
+            entries = nn.functional.pad(entries, (0, 0, 1, 0))
+        first = torch.relu(self.belief(observation[:, :belief])[:, None] + self.entry(entries))
+        scores = self.score(torch.relu(self.hidden(first)))
+        if outputs == 1:
+            return scores[:, :, 0]
+        awake = nn.functional.pad(scores[:, 1:, 1:], (1, 0))
+        return torch.cat([scores[:, :, 0], awake.flatten(1)], dim=1)
+
+    def forward_critic(self, observation):
+        """(B, 1)."""
+        return self.critic(observation)
+
+    def network(self) -> EntryNetwork:
+        """The actor as NumPy arrays."""
+        parts = {"belief": self.belief, "entry": self.entry, "hidden": self.hidden, "score": self.score}
+        arrays = {}
+        for name, layer in parts.items():
+            arrays[f"{name}.weight"] = layer.weight.detach().cpu().numpy().T
+            if layer.bias is not None:
+                arrays[f"{name}.bias"] = layer.bias.detach().cpu().numpy()
+        return EntryNetwork(arrays)
+
+
+class EntryPolicy(ActorCriticPolicy):
+    """PPO's policy with an EntryActorCritic; `entries` are its arguments."""
+
+    def __init__(self, *args, entries: dict | None = None, **kwargs):
+        self.entries = entries
+        super().__init__(*args, **kwargs)
+
+    def _build(self, lr_schedule) -> None:
+        self.mlp_extractor = EntryActorCritic(**self.entries)
+        self.action_net, self.value_net = nn.Identity(), nn.Identity()
+        self.optimizer = self.optimizer_class(self.parameters(), lr=lr_schedule(1), **self.optimizer_kwargs)
+
+    def _get_constructor_parameters(self):
+        return super()._get_constructor_parameters() | {"entries": self.entries}
+
+
+def network_of(model) -> Network:
+    """The actor of a stable-baselines3 PPO model: an EntryPolicy's, or one with two tanh layers."""
+    policy = model.policy
+    if isinstance(policy, EntryPolicy):
+        return policy.mlp_extractor.network()
+    linear = [m for m in [*policy.mlp_extractor.policy_net, policy.action_net] if hasattr(m, "weight")]
+    arrays = {}
+    for i, layer in enumerate(linear):
+        arrays[f"{i}.weight"] = layer.weight.detach().cpu().numpy().T
+        arrays[f"{i}.bias"] = layer.bias.detach().cpu().numpy()
+    return FlatNetwork(arrays)

@@ -1,0 +1,186 @@
+"""PPO through RLlib: train.py's network, rewards and fields, with a native batch in every runner of a Ray cluster."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import gymnasium as gym
+import ray
+from ray.rllib.algorithms.ppo import PPOConfig
+from ray.rllib.algorithms.ppo.torch.ppo_torch_learner import PPOTorchLearner
+from ray.rllib.connectors.connector_v2 import ConnectorV2
+from ray.rllib.core.columns import Columns
+from ray.rllib.core.rl_module.apis.value_function_api import ValueFunctionAPI
+from ray.rllib.core.rl_module.rl_module import RLModuleSpec
+from ray.rllib.core.rl_module.torch import TorchRLModule
+from ray.rllib.evaluation.postprocessing import Postprocessing
+from ray.rllib.utils.numpy import convert_to_numpy
+from ray.tune.registry import register_env
+
+from wsn_env.evaluation.progress import Progress
+from wsn_env.evaluation.ray_engine import connect
+from wsn_env.learning.actor_critic import EntryActorCritic
+from wsn_env.learning.levelling import Levelling
+from wsn_env.learning.native_runner import NativeRunner
+from wsn_env.learning.network import EntryNetwork
+
+PERIODS = "periods.json"
+FIRST_S = 900.0  # a rollout may take so long: runners compile their kernels in the first
+
+
+class EntryModule(TorchRLModule, ValueFunctionAPI):
+    """An EntryActorCritic; model_config["entries"] are its arguments."""
+
+    def setup(self):
+        """Make the network."""
+        self.net = EntryActorCritic(**self.model_config["entries"])
+
+    def _forward(self, batch, **kwargs):
+        return {Columns.ACTION_DIST_INPUTS: self.net.forward_actor(batch[Columns.OBS])}
+
+    def compute_values(self, batch, embeddings=None):
+        """(B,) of the critic."""
+        return self.net.forward_critic(batch[Columns.OBS]).squeeze(-1)
+
+
+class LevelledLearner(PPOTorchLearner):
+    """PPO's, with advantages levelled by learner_config_dict["level"]."""
+
+    def build(self) -> None:
+        """As PPO's; then, after the advantages, level."""
+        super().build()
+        self._learner_connector.append(_Level(self.config.learner_config_dict["level"]))
+
+
+class _Level(ConnectorV2):
+    def __init__(self, level: float):
+        super().__init__()
+        self._levelling = Levelling(level)
+
+    def __call__(self, *, batch, **kwargs):
+        for own in batch.values():
+            advantages = own[Postprocessing.ADVANTAGES]
+            levelled = self._levelling(*map(convert_to_numpy, (own[Columns.OBS], advantages)))
+            own[Postprocessing.ADVANTAGES] = advantages.new_tensor(levelled)
+        return batch
+
+
+class _OwnSeeds(gym.vector.VectorWrapper):
+    """RLlib seeds runner w with seed + w, and rows take seed + i: the runners would meet nearly the same fields."""
+
+    def __init__(self, envs: gym.vector.VectorEnv, first: int):
+        super().__init__(envs)
+        self._first = first
+
+    def reset(self, *, seed=None, options=None):
+        """Row i of runner w gets first + w rows + i."""
+        own = None if seed is None else self._first + (seed - self._first) * self.num_envs
+        return self.env.reset(seed=own, options=options)
+
+
+class RayTraining:
+    """PPO on a Ray cluster, from its last checkpoint where there is one; a context, which stops what it has started.
+
+    Args:
+        make_rows: how many -> native vector environment in disabled autoreset mode, with the training's rewards.
+        entries: arguments of EntryActorCritic.
+        folder: of the checkpoint.
+        rows: over all runners.
+        runners: processes that step environments, a core each; 0: none but this one.
+        rollout: periods of each row between two updates.
+        level: see Levelling.
+        seed: of training.
+        address: of a running cluster; None: one on this machine.
+        training: more of RLlib's `training`: lr, gamma, ...
+    """
+
+    def __init__(
+        self,
+        make_rows: Callable[[int], gym.vector.VectorEnv],
+        entries: dict,
+        folder: Path,
+        *,
+        rows: int,
+        runners: int,
+        rollout: int,
+        level: float,
+        seed: int,
+        address: str | None = None,
+        **training,
+    ):
+        self.periods = 0
+        self._folder = folder
+        connect(address)
+        register_env("wsn_env", lambda context: _OwnSeeds(make_rows(context["num_envs"]), seed))
+        each = rows // max(runners, 1)
+        self._algorithm = (
+            PPOConfig()
+            .environment("wsn_env")
+            .env_runners(
+                env_runner_cls=NativeRunner,
+                num_env_runners=runners,
+                num_envs_per_env_runner=each,
+                gym_env_vectorize_mode="vector_entry_point",
+                rollout_fragment_length=rollout,
+                sample_timeout_s=FIRST_S,
+            )
+            .fault_tolerance(restart_failed_env_runners=True)
+            .training(
+                learner_class=LevelledLearner,
+                learner_config_dict={"level": level},
+                train_batch_size_per_learner=rollout * each * max(runners, 1),
+                use_kl_loss=False,
+                vf_clip_param=float("inf"),
+                clip_param=0.2,
+                vf_loss_coeff=0.5,
+                grad_clip=0.5,
+                **training,
+            )
+            .rl_module(rl_module_spec=RLModuleSpec(module_class=EntryModule, model_config={"entries": entries}))
+            .debugging(seed=seed, log_level="ERROR")
+        ).build_algo()
+        if folder.exists():
+            self._algorithm.restore_from_path(str(folder.absolute()))
+            self.periods = json.loads((folder / PERIODS).read_text())
+
+    def __enter__(self) -> RayTraining:
+        return self
+
+    def __exit__(self, *_) -> None:
+        self._algorithm.stop()
+        ray.shutdown()
+
+    def run(self, steps: int, checkpoint_steps: int, progress: Progress) -> None:
+        """Train up to so many periods in all; a checkpoint every `checkpoint_steps`, and whatever ends it."""
+        saved = self.periods
+        try:
+            while self.periods < steps:
+                result = self._algorithm.train()
+                self.periods = int(result["num_env_steps_sampled_lifetime"])
+                # Without "env_runners": all of them were lost, or late; they sample in the next turn.
+                reward = result.get("env_runners", {}).get("episode_return_mean", float("nan"))
+                progress(min(self.periods, steps), steps, f"training, reward {reward:.1f}")
+                if self.periods - saved >= checkpoint_steps:
+                    self._save()
+                    saved = self.periods
+        finally:
+            self._save()
+
+    def _save(self) -> None:
+        """Whole or not at all."""
+        new, old = (self._folder.with_name(f"{self._folder.name}.{word}") for word in ("new", "old"))
+        for folder in (new, old):
+            shutil.rmtree(folder, ignore_errors=True)
+        self._algorithm.save_to_path(str(new.absolute()))
+        (new / PERIODS).write_text(json.dumps(self.periods))
+        if self._folder.exists():
+            self._folder.rename(old)
+        new.rename(self._folder)
+        shutil.rmtree(old, ignore_errors=True)
+
+    def network(self) -> EntryNetwork:
+        """The actor as NumPy arrays."""
+        return self._algorithm.get_module().net.network()

@@ -1,0 +1,1 @@
+"""What the world is made of: measurements, detection, motion, radio."""

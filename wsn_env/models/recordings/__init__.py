@@ -1,0 +1,1 @@
+"""Recorded motion and recorded radio, read from files."""

@@ -1,0 +1,128 @@
+"""What receivers hear of a beacon that the target carries."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from wsn_env.models.quantity import ScenarioError, quantity
+from wsn_env.models.sections.sensing import Measurement
+
+MAP_LEAVES = 0.15  # of the static field's variance, where a map was made on other days
+
+
+@dataclass(frozen=True)
+class Beacon(Measurement):
+    """Levels [dBm] of the packets that a beacon advertises; a receiver that listens reports each one that it hears.
+
+        level = P0 - 10 n log10(d) + field(x, y) + drift(t) + white,    rounded to 1 dB
+
+    with the distance d in three dimensions. P0 and n are each receiver's own (one number: of all alike). The field is
+    static, Gaussian with covariance field_db^2 exp(-d / field_m); the drift is an AR(1) of drift_db with time constant
+    drift_s; the white part is a mixture of two normals, the lower one for fading. Each receiver has its own draws.
+    Packets are lost in bursts: `loss` of all, `loss_after_loss` of those after a lost one. White noise alone would make
+    a simulation half as hard as it is, and would make listening to the nearest receivers look harmless.
+
+    The tracker takes field and drift together for a bias of time constant `bias_s`. The default figures are those of
+    the recordings of Danis, Naskali, Cemgil & Ersoy (2022), see `Ble-v0`.
+    """
+
+    code: ClassVar[int] = 5
+    at_1m_db: float | tuple[float, ...] = -59.1  # P0; a number, or one a receiver
+    exponents: float | tuple[float, ...] = 1.7  # n
+    heights_m: float | tuple[float, ...] = 0.0  # of the receivers
+    beacon_m: float = quantity(0.0, "height of the beacon", at_least=0, at_most=1000)
+    floor_m: float = quantity(0.1, "nearer than this the level grows no more", above=0)
+    field_db: float = quantity(2.24, "sd of the static field", at_least=0)
+    field_m: float = quantity(0.8, "its correlation length", above=0)
+    drift_db: float = quantity(2.02, "sd of the drift", at_least=0)
+    drift_s: float = quantity(7.0, "its time constant", above=0)
+    main_db: float = quantity(1.8, "white part: mean of the upper component")
+    main_sd_db: float = quantity(2.9, "its sd", at_least=0)
+    fade_share: float = quantity(0.4, "weight of the lower component", at_least=0, at_most=1)
+    fade_db: float = quantity(-2.7, "its mean")
+    fade_sd_db: float = quantity(4.5, "its sd", at_least=0)
+    loss: float = quantity(0.146, "probability that a packet is lost", at_least=0, below=1)
+    loss_after_loss: float = quantity(0.216, "the same after a lost one", at_least=0, below=1)
+    interval_s: float = quantity(0.4525, "between packets", at_least=0.01, at_most=60)
+    bias_s: float = quantity(7.0, "time constant of the bias that the tracker takes field and drift for", above=0)
+
+    temper: float = quantity(
+        0.7,
+        "exponent of a level's likelihood in the tracker: below 1 since errors are more alike than it believes",
+        above=0,
+        at_most=1,
+    )
+
+    residual_map: str | None = None  # a file of `wsn calibrate --maps`: the static field as the tracker knows it
+
+    def __post_init__(self):
+        super().__post_init__()
+        for name in ("at_1m_db", "exponents", "heights_m"):
+            value = getattr(self, name)
+            try:
+                array = np.asarray(value, dtype=float)
+            except (TypeError, ValueError):
+                array = np.array(np.nan)
+            if array.ndim > 1 or not array.size or not np.isfinite(array).all():
+                raise ScenarioError(f"Beacon.{name} = {value!r}: must be a finite number, or one for each receiver")
+            object.__setattr__(self, name, tuple(array.tolist()) if array.ndim else array.item())
+        if not self.least_loss_after_loss <= self.loss_after_loss:
+            raise ScenarioError(
+                f"Beacon.loss_after_loss = {self.loss_after_loss}: must be at least {self.least_loss_after_loss:.3g}"
+                f" for a loss of {self.loss}: else more than every packet after a received one would be lost"
+            )
+
+    @property
+    def least_loss_after_loss(self) -> float:
+        """P(loss | none before) = loss (1 - loss_after_loss) / (1 - loss) must not exceed 1."""
+        return max(0.0, 1.0 - (1.0 - self.loss) / self.loss) if self.loss > 0 else 0.0
+
+    @property
+    def loss_after_none(self) -> float:
+        """Probability that a packet is lost after one that was not."""
+        return self.loss * (1.0 - self.loss_after_loss) / (1.0 - self.loss)
+
+    @property
+    def bias_db(self) -> float:
+        """sd of the tracker's bias state: field and drift; of the field with a map what that leaves of it."""
+        left = 1.0 if self.residual_map is None else MAP_LEAVES
+        return math.sqrt(left * self.field_db**2 + self.drift_db**2)
+
+    @property
+    def white_db(self) -> float:
+        """sd of the white part."""
+        share, gap = self.fade_share, self.main_db - self.fade_db
+        inner = (1 - share) * self.main_sd_db**2 + share * self.fade_sd_db**2
+        return math.sqrt(inner + share * (1 - share) * gap**2)
+
+    def packets(self, period_s: float) -> float:
+        """Expected number of packets that a listening receiver hears in a period."""
+        return (1.0 - self.loss) * period_s / self.interval_s
+
+    def heard(self, period_s: float) -> float:
+        """Probability that it hears at least one."""
+        sent = period_s / self.interval_s
+        fewer, share = math.floor(sent), sent - math.floor(sent)
+
+        def missed(n: int) -> float:
+            return 1.0 if n == 0 else self.loss * self.loss_after_loss ** (n - 1)
+
+        return 1.0 - (1.0 - share) * missed(fewer) - share * missed(fewer + 1)
+
+    def of_nodes(self, nodes: int) -> np.ndarray:
+        """(S, 3): P0 [dBm], n, squared difference of heights [m^2].
+
+        Raises:
+            ScenarioError: a list has another length.
+        """
+        columns = []
+        for name in ("at_1m_db", "exponents", "heights_m"):
+            array = np.asarray(getattr(self, name), dtype=float)
+            if array.ndim and len(array) != nodes:
+                raise ScenarioError(f"Beacon.{name} has {len(array)} entries: must have one for each of {nodes} nodes")
+            columns.append(np.broadcast_to(array, nodes))
+        return np.stack([columns[0], columns[1], (columns[2] - self.beacon_m) ** 2], axis=1)

@@ -1,0 +1,68 @@
+"""Learning curves of a training, for its report."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from itertools import chain, pairwise
+from pathlib import Path
+
+import numpy as np
+
+from wsn_env.envs.rendering.colours import BLUE
+from wsn_env.reports.pages.page import image, section
+
+CURVES = {  # of a training's progress.csv: the mean, its standard error, what it is
+    "rollout/episode_rms_m": ("rollout/episode_rms_se_m", "RMS error of an episode [m]"),
+    "rollout/ep_rew_mean": ("rollout/ep_rew_se", "training return, scaled"),
+}
+STEPS = "time/total_timesteps"
+NORMAL_95 = 1.96
+FEW = 10  # points are drawn, too
+
+
+def learning_sections(folder: Path) -> list[str]:
+    """The learning curves of a run; none if it has none."""
+    progress = read_progress(folder)
+    steps = progress.get(STEPS)
+    drawn = [name for name in CURVES if name in progress and np.isfinite(progress[name]).any()]
+    if steps is None or not drawn:
+        return []
+    curves = image(_draw_curves(steps, progress, drawn), "learning curves")
+    return [section("Learning", "<p>Means over the last episodes, with 95 % intervals.</p>", curves)]
+
+
+def read_progress(folder: str | Path) -> dict[str, np.ndarray]:
+    """Columns of all progress-STEPS/progress.csv of a run, in the order of the steps; what is missing is NaN.
+
+    Of a run that was killed, a line that was cut short is left out, and so is what a resumed one has trained again.
+    """
+    begins = {int(path.parent.name.partition("-")[2]): path for path in Path(folder).glob("progress-*/progress.csv")}
+    starts = [*sorted(begins), np.inf]
+    rows = []
+    for start, resumed in pairwise(starts):
+        whole, _, _cut_short = begins[start].read_text().rpartition("\n")
+        read = [{k: float(value or "nan") for k, value in row.items()} for row in csv.DictReader(whole.splitlines())]
+        rows += [row for row in read if row.get(STEPS, np.nan) <= resumed]
+    names = dict.fromkeys(chain.from_iterable(rows))
+    return {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
+
+
+def _draw_curves(steps, progress: dict[str, np.ndarray], names: Sequence[str]):
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(4.5 * len(names), 3.4), layout="constrained")
+    for axes, name in zip(np.atleast_1d(figure.subplots(1, len(names))), names):
+        error, what = CURVES[name]
+        known = np.isfinite(progress[name])
+        marker = "o" if known.sum() < FEW else None
+        axes.plot(steps[known], progress[name][known], color=BLUE, linewidth=1.5, marker=marker)
+        if error in progress:
+            half = NORMAL_95 * progress[error][known]
+            ends = progress[name][known] - half, progress[name][known] + half
+            axes.fill_between(steps[known], *ends, color=BLUE, alpha=0.25, linewidth=0)
+        axes.set(xlabel="periods of training", ylabel=what)
+        axes.xaxis.set_major_formatter(lambda value, _: f"{value / 1e6:g} M" if value >= 1e5 else f"{value:,.0f}")
+        axes.xaxis.get_major_locator().set_params(nbins=5)
+        axes.grid(alpha=0.3)
+    return figure

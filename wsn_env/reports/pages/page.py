@@ -1,0 +1,71 @@
+"""Templates filled in: one file of HTML with everything that it needs inside."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+from collections.abc import Sequence
+from importlib.resources import files
+
+from wsn_env.reports.pictures import picture_address
+
+
+def template(name: str) -> str:
+    """The text of a file of `templates/`."""
+    return (files("wsn_env.reports.pages") / "templates" / name).read_text(encoding="utf-8")
+
+
+def filled(name: str, **parts: str) -> str:
+    """A template, each {{part}} replaced by its HTML. What is put in is not looked at again."""
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], template(name))
+
+
+def whole_page(kind: str, title: str, body: str) -> str:
+    """A page with our style.
+
+    Args:
+        kind: "replay" or "report".
+        title: plain text.
+        body: HTML.
+    """
+    return filled("page.html", kind=kind, title=html.escape(title), style=template("style.css"), body=body)
+
+
+def script_safe(data) -> str:
+    """JSON that cannot end the script element that it stands in."""
+    return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+
+# --- parts of a body ---
+
+
+def section(title: str, *parts: str) -> str:
+    """A part of a report under a heading."""
+    return f"<section><h2>{html.escape(title)}</h2>\n" + "\n".join(parts) + "</section>"
+
+
+def table(rows: Sequence[Sequence[str]], strong: str | None = None) -> str:
+    """Rows of text; with `strong` the first is the header, and the row of that name stands out."""
+    lines = []
+    for k, row in enumerate(rows):
+        cell = "th" if strong is not None and k == 0 else "td"
+        mark = ' class="strong"' if strong is not None and row[0] == strong else ""
+        lines.append(f"<tr{mark}>" + "".join(f"<{cell}>{html.escape(str(text))}</{cell}>" for text in row) + "</tr>")
+    kind = "" if strong is None else ' class="figures"'
+    return f'<div class="wide"><table{kind}>{"".join(lines)}</table></div>'
+
+
+def folded(title: str, *parts: str, open: bool = False) -> str:
+    """What opens at a click."""
+    return f"<details{' open' if open else ''}><summary>{html.escape(title)}</summary>{''.join(parts)}</details>"
+
+
+def values_table(values: dict) -> str:
+    """Names and values."""
+    return table([(k, v if isinstance(v, str) else json.dumps(v, default=str)) for k, v in values.items()])
+
+
+def image(figure, words: str) -> str:
+    """A matplotlib figure, and what it shows in words."""
+    return f'<img alt="{html.escape(words)}" src="{picture_address(figure)}">'

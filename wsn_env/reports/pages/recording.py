@@ -1,0 +1,132 @@
+"""An episode as plain numbers, period by period: what a page shows of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wsn_env.compiled import draws
+from wsn_env.envs.rendering import colours
+from wsn_env.envs.rendering.plan import legend, shows_radius
+from wsn_env.evaluation.policies import Policy
+from wsn_env.evaluation.rollout import episodes
+from wsn_env.scenario import Scenario
+from wsn_env.simulation.state import Outcome, State
+from wsn_env.simulation.view import View
+from wsn_env.simulation.world import World
+
+HUES = {  # by symbol of the frames' legend
+    "member": colours.BLUE,
+    "head": colours.VERMILION,
+    "sink": colours.VERMILION,
+    "heard": colours.ORANGE,
+    "report": colours.ORANGE,
+    "handover": colours.PURPLE,
+    "cloud": colours.SKY,
+    "target": colours.GREEN,
+    "search": colours.YELLOW,
+}
+CLOUD = 120  # particles shown of a period
+FINE, COARSE = 9999, 999  # steps across the room: of lines and of clouds
+
+
+@dataclass(frozen=True)
+class Episode:
+    """What one policy made of an episode; frames[k] is after k periods."""
+
+    policy: str
+    frames: list[dict]
+    rms_m: float
+    energy_mj: float  # in a period
+    total: float  # return
+
+
+@dataclass(frozen=True)
+class Recording:
+    """An episode, and what each of some policies made of it."""
+
+    episodes: list[Episode]
+    common: dict  # the room, the nodes, the track
+
+
+def record(policies: dict[str, Policy], scenario: Scenario, seed: int) -> Recording:
+    """Play an episode, the very one of `reset(seed=seed)`, under each policy.
+
+    Args:
+        policies: by name.
+        scenario: with one lam.
+        seed: of the episode.
+    """
+    world = World(scenario, threads=1)
+    played = [_played(name, policy, world, seed) for name, policy in policies.items()]
+    return Recording(played, _common(world.reset([draws.key_of_seed(seed)]), scenario, seed))
+
+
+def _played(name: str, policy: Policy, world: World, seed: int) -> Episode:
+    scenario = world.scenario
+    frames, squares, joules, total = [], [], [], 0.0
+
+    def note(state: State, outcome: Outcome) -> None:
+        frames.append(_frame(state, outcome, scenario))
+
+    for state, outcome in episodes(policy, world, [seed], begin=note):
+        note(state, outcome)
+        squares.append(outcome.error_m[0] ** 2)
+        joules.append(outcome.energy_mj[0])
+        total -= outcome.error_m[0] + state.lam[0] * outcome.energy_mj[0]
+    scored = squares[scenario.unscored :]
+    return Episode(name, frames, float(np.sqrt(np.mean(scored))), float(np.mean(joules)), float(total))
+
+
+def _common(state: State, scenario: Scenario, seed: int) -> dict:
+    width, depth = scenario.field.room_m
+    whole = max(width, depth)
+    receiver = scenario.radio.receiver
+    searches = [("search", "search")] if scenario.tracking.search or scenario.tracking.start == "search" else []
+    return {
+        "scenario": scenario.name,
+        "seed": seed,
+        "lam": float(state.lam[0]),
+        "period_s": scenario.period_s,
+        "unscored": scenario.unscored,
+        "room_m": [width, depth],
+        "unit_m": whole / FINE,
+        "coarse_m": whole / COARSE,
+        "radius_m": scenario.radius_m if shows_radius(scenario) else None,
+        "battery_j": scenario.radio.battery_j,
+        "receiver": receiver,
+        "hue": HUES,
+        "legend": [(symbol, words) for symbol, words in legend(scenario) if symbol in HUES] + searches,
+        "nodes": _steps(state.network.positions[0], whole),
+        "track": _steps(state.track[0, :, ::2], whole),
+    }
+
+
+def _steps(points, whole: float, steps: int = FINE) -> list:
+    """Coordinates [m] as whole steps, x and y in turn."""
+    return np.rint(np.asarray(points, float) * (steps / whole)).astype(int).ravel().tolist()
+
+
+def _frame(state: State, outcome: Outcome, scenario: Scenario) -> dict:
+    """A period of a batch of one."""
+    whole = max(scenario.field.room_m)
+    network, belief, reports = state.network, state.belief.row[0], state.reports
+    x = state.belief.particles[0]
+    shown = slice(0, None, max(1, -(-x.shape[1] // CLOUD)))
+    payers = state.ledger.payer[0, : state.ledger.count[0]]
+    frame = {
+        "mean": _steps(belief["mean"][::2], whole),
+        "cov": [float(f"{belief['cov'][i, j]:.3g}") for i, j in ((0, 0), (0, 2), (2, 2))],
+        "cloud": _steps(np.clip(x[::2, shown].T, 0, whole), whole, COARSE),
+        "head": int(network.head[0]),
+        "members": network.members[0, : network.n_members[0]].tolist(),
+        "heard": reports.node[0, : reports.count[0]].tolist(),
+        "left_j": [[int(node), float(f"{network.battery[0, node]:.7g}")] for node in payers],
+        "error": round(float(outcome.error_m[0]), 3),
+        "energy": round(float(outcome.energy_mj[0]), 5),
+        "awake": int(outcome.members[0]),
+        "search": bool(outcome.searched[0]),
+        "handover": bool(outcome.handover[0]),
+    }
+    return frame | ({"detects": np.flatnonzero(View.of(state).sees[0]).tolist()} if scenario.binary else {})

@@ -1,0 +1,46 @@
+"""The replay page: an episode under one policy, or under two on the same random numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from wsn_env.evaluation.files import replacing
+from wsn_env.evaluation.policies import Policy
+from wsn_env.models.quantity import ScenarioError
+from wsn_env.reports.pages.page import filled, script_safe, template, whole_page
+from wsn_env.reports.pages.recording import Recording, record
+from wsn_env.scenario import Scenario
+
+MOST = 2  # policies side by side
+
+
+def replay(policies: dict[str, Policy], scenario: Scenario, seed: int, out: str | Path) -> Recording:
+    """Play an episode and write its page.
+
+    Args:
+        policies: one or two, by name.
+        scenario: with one lam.
+        seed: of `reset`.
+        out: file to write; its folder is made.
+
+    Raises:
+        ValueError: too many policies, a lam that is a range, or a seed below 0.
+    """
+    if not 1 <= len(policies) <= MOST:
+        raise ValueError(f"policies = {', '.join(policies) or 'none'}: must be one or two")
+    if scenario.lam_range[0] != scenario.lam_range[1]:
+        raise ScenarioError(f"Scenario.lam = {scenario.lam!r}: must be one number for a replay")
+    if seed < 0:
+        raise ValueError(f"seed = {seed}: must be at least 0")
+    recording = record(policies, scenario, seed)
+    page = whole_page("replay", f"{scenario.name}, seed {seed}", player(recording))
+    Path(out).parent.mkdir(parents=True, exist_ok=True)
+    with replacing(out) as path:
+        path.write_text(page, encoding="utf-8")
+    return recording
+
+
+def player(recording: Recording) -> str:
+    """HTML of the player for a page; a page has room for one."""
+    data = recording.common | {"episodes": [vars(episode) for episode in recording.episodes]}
+    return filled("player.html", data=script_safe(data), script=template("player.js"))

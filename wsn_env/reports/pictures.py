@@ -1,0 +1,38 @@
+"""matplotlib figures to files and pages."""
+
+from __future__ import annotations
+
+import base64
+import io
+from importlib.util import find_spec
+from pathlib import Path
+
+from wsn_env.evaluation.files import replacing
+
+NEEDED = "pictures need matplotlib: pip install 'wsn_env[plot]'"
+
+
+def can_draw() -> bool:
+    """Whether matplotlib is there."""
+    return find_spec("matplotlib") is not None
+
+
+def plain(text: str) -> str:
+    """A label that matplotlib shows as it is: dollars begin no formula, an underscore at the start hides nothing."""
+    return (" " if text.startswith("_") else "") + text.replace("$", r"\$")
+
+
+def write_picture(path: str | Path, figure, dpi: int = 140) -> None:
+    """A figure as PNG, whole or not at all."""
+    with replacing(path) as temporary:
+        figure.savefig(temporary, format="png", dpi=dpi)
+
+
+def picture_address(figure) -> str:
+    """A figure as an SVG inside its own address, for the src of an image; the same figure gives the same text."""
+    from matplotlib import rc_context
+
+    written = io.StringIO()
+    with rc_context({"svg.fonttype": "none", "svg.hashsalt": "wsn_env"}):
+        figure.savefig(written, format="svg", metadata={"Date": None})
+    return "data:image/svg+xml;base64," + base64.b64encode(written.getvalue().encode()).decode()

@@ -1,0 +1,5 @@
+"""What is simulated: a scenario of quantities with units, and the published systems as presets."""
+
+from wsn_env.scenario.scenario import PRESETS, Scenario
+
+__all__ = ["PRESETS", "Scenario"]

@@ -1,0 +1,393 @@
+"""A scenario says everything about a simulated network and its target; the published systems are presets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from wsn_env.models.quantity import NUMBERS, ScenarioError, Section, quantity, suggest
+from wsn_env.models.recordings.replay import periods_of, read_quantities
+from wsn_env.models.sections import (
+    DETECTIONS,
+    MOTIONS,
+    RADIOS,
+    Beacon,
+    Binary,
+    Bluetooth,
+    Crossing,
+    Cruise,
+    Detection,
+    Field,
+    Link,
+    Measurement,
+    Modem,
+    Motion,
+    Position,
+    Radio,
+    Replay,
+    Rssi,
+    Sonar,
+    Threshold,
+    Walk,
+)
+from wsn_env.scenario.tracking import BOUNDARY_TRACKERS, MEASUREMENTS, READS, Tracking
+
+RING_OF_EIGHT = tuple((x, y) for y in (0.0, 100.0, 200.0) for x in (0.0, 100.0, 200.0) if (x, y) != (100.0, 100.0))
+
+DONGLES = (  # m, in the order of the dataset's file
+    (7.00, 7.09),
+    (7.18, 0.68),
+    (0.71, 6.16),
+    (7.25, 11.36),
+    (0.76, 12.13),
+    (7.18, 17.64),
+    (13.14, 12.33),
+    (12.82, 16.83),
+    (18.12, 11.93),
+    (13.01, 5.51),
+    (17.77, 6.33),
+    (12.76, 0.27),
+)
+
+KINDS = {
+    "name": (str,),
+    "field": (Field,),
+    "motion": tuple(MOTIONS.values()),
+    "detection": tuple(DETECTIONS.values()),
+    "measurement": tuple(MEASUREMENTS.values()),
+    "radio": tuple(RADIOS.values()),
+    "tracking": (Tracking,),
+}
+BY_NAME = {"motion": MOTIONS, "detection": DETECTIONS, "measurement": MEASUREMENTS, "radio": RADIOS}
+
+
+@dataclass(frozen=True)
+class Scenario(Section):
+    """Everything about a simulated network. `Scenario.named(id)` gives a published system's."""
+
+    name: str = "PreDC-v0"
+    periods: int = quantity(100, "horizon of an episode", at_least=1, whole=True)
+    period_s: float = quantity(1.0, "sampling period T", above=0, at_most=3600)
+    lam: float | tuple[float, float] = 4.0  # m/mJ; a pair (low, high): drawn log-uniformly for each episode
+    typical_error_m: float = quantity(1.0, "error of a good schedule: the scale of a learner's rewards", above=0)
+    typical_energy_mj: float = quantity(0.3, "its energy in a period", above=0)
+    unscored: int = quantity(0, "periods at the start that rms_m leaves out: acquisition", at_least=0, whole=True)
+    # The hypervolume's reference point: the error of the head alone, the energy of every node within sensing range,
+    # both measured (nearest0; static_cluster or the scenario's own policy) and rounded up past their intervals.
+    reference_error_m: float = quantity(1.5, "mean error that a point of a front must stay below", above=0)
+    reference_energy_mj: float = quantity(0.4, "energy in a period that it must stay below", above=0)
+    field: Field = Field()
+    motion: Motion = Crossing()
+    detection: Detection | Threshold = Detection()
+    measurement: Measurement = Position()
+    radio: Link = Radio()
+    tracking: Tracking = Tracking()
+
+    def __post_init__(self):
+        super().__post_init__()
+        for name, kinds in KINDS.items():
+            value = getattr(self, name)
+            if not isinstance(value, kinds):
+                raise ScenarioError(f"Scenario.{name} = {value!r}: must be a {' or '.join(k.__name__ for k in kinds)}")
+        if self.unscored >= self.periods:
+            raise ScenarioError(f"Scenario.unscored = {self.unscored}: must be below periods = {self.periods}")
+        self._check_tracker()
+        low, high = self.lam_range
+        if not (np.isfinite([low, high]).all() and 0 <= low <= high) or (low == 0) != (high == 0):
+            raise ScenarioError(f"Scenario.lam = {self.lam!r}: must be at least 0 m/mJ, or a pair 0 < low <= high")
+        if isinstance(self.detection, Threshold):
+            self.detection.check(self.measurement)
+        if isinstance(self.measurement, Beacon):
+            self.measurement.of_nodes(self.field.nodes)
+            if self.tracking.search:
+                raise ScenarioError("Tracking.search = True: allowed is False with Beacon levels")
+        elif isinstance(self.motion, Replay):
+            raise ScenarioError(
+                f"Scenario.measurement = {type(self.measurement).__name__}: must be Beacon with the motion 'replay'"
+            )
+        if isinstance(self.radio, Modem) and self.period_s < self.radio.report_s:
+            raise ScenarioError(
+                f"Scenario.period_s = {self.period_s}: must be at least {self.radio.report_s:.3g} s, until a report of"
+                f" {self.radio.report_bits} bits has arrived"
+            )
+
+    def _check_tracker(self) -> None:
+        name, kind = self.tracking.tracker, type(self.measurement)
+        if not issubclass(kind, READS[name]):
+            able = [measurement for measurement, its_kind in MEASUREMENTS.items() if its_kind in READS[name]]
+            allowed = "allowed are the measurements" if len(able) > 1 else "allowed is the measurement"
+            raise ScenarioError(
+                f"Tracking.tracker = {name!r}: cannot read {kind.__name__} reports; {allowed} {' and '.join(able)}"
+            )
+        if name in BOUNDARY_TRACKERS and not name.startswith("centroid") and self.measurement.reports != "changes":
+            raise ScenarioError(
+                f"Binary.reports = {self.measurement.reports!r}: allowed is 'changes' with the tracker {name!r}"
+            )
+        needless = {
+            "silent_information": name != "particle",
+            "resampling": name != "particle",
+            "redraw_on_handover": name != "particle",
+            "velocity_s": name != "particle",
+            "gate_m": name not in BOUNDARY_TRACKERS,
+        }
+        usual = {item.name: item.default for item in fields(self.tracking)}
+        wrong = [item for item, idle in needless.items() if idle and getattr(self.tracking, item) != usual[item]]
+        if wrong:
+            given = ", ".join(f"Tracking.{item} = {getattr(self.tracking, item)!r}" for item in wrong)
+            allowed = ", ".join(repr(usual[item]) for item in wrong)
+            raise ScenarioError(f"{given}: allowed is {allowed} with the tracker {name!r}, which makes no use of it")
+        if self.binary and self.tracking.silent_information:
+            raise ScenarioError(
+                "Tracking.silent_information = True: allowed is False with Binary reports, whose bitmap already tells"
+                " who keeps silent"
+            )
+        if self.hears and (self.tracking.silent_information or self.tracking.fusion != "joint"):
+            raise ScenarioError(
+                f"Tracking.silent_information = {self.tracking.silent_information}, Tracking.fusion ="
+                f" {self.tracking.fusion!r}: allowed are False and 'joint' with Beacon levels"
+            )
+
+    @property
+    def lam_range(self) -> tuple[float, float]:
+        """(lowest, highest) lam of an episode [m/mJ]."""
+        pair = tuple(self.lam) if isinstance(self.lam, (tuple, list)) else (self.lam, self.lam)
+        if len(pair) != 2 or any(isinstance(x, bool) or not isinstance(x, NUMBERS) for x in pair):
+            raise ScenarioError(f"Scenario.lam = {self.lam!r}: must be a number of m/mJ or a pair of them")
+        return float(pair[0]), float(pair[1])
+
+    @property
+    def lam_balance(self) -> float:
+        """Where the typical error and the typical energy cost about the same, to one digit [m/mJ]."""
+        return float(f"{self.typical_error_m / self.typical_energy_mj:.1g}")
+
+    def typical_cost(self, lam):
+        """What a period of a good schedule costs at this lam, about [m]: the scale of a learner's rewards.
+
+        A schedule that lam suits pays for less energy the dearer it is, hence the root.
+
+        Args:
+            lam: (...,) m/mJ.
+        """
+        return self.typical_error_m * np.sqrt(1.0 + lam * self.typical_energy_mj / self.typical_error_m)
+
+    @property
+    def lam_span(self) -> tuple[float, float]:
+        """The trade-offs that matter [m/mJ]: from precise to frugal, 0.3 to 30 for PreDC-v0."""
+        return float(f"{self.lam_balance / 10:.2g}"), float(f"{self.lam_balance * 10:.2g}")
+
+    @property
+    def lam_octaves(self) -> tuple[float, ...]:
+        """Six of them to compare at [m/mJ]: 0.5, 1, 2, 4, 8, 16 for PreDC-v0."""
+        return tuple(float(f"{self.lam_balance * 2**k / 6:.3g}") for k in range(6))
+
+    @property
+    def locates(self) -> bool:
+        """Whether a node reports where the target is, not only how strong its signal."""
+        return isinstance(self.measurement, Position)
+
+    @property
+    def binary(self) -> bool:
+        """Whether nodes report a single bit."""
+        return isinstance(self.measurement, Binary)
+
+    @property
+    def hears(self) -> bool:
+        """Whether nodes report the levels of a beacon's packets."""
+        return isinstance(self.measurement, Beacon)
+
+    @property
+    def ring_m(self) -> float:
+        """How far from the target a node tells most: at the edge of detection for one bit, as near as may be else."""
+        return self.radius_m if self.binary else 0.0
+
+    @property
+    def filter_q(self) -> float:
+        """The filter's acceleration noise [m/s^2]."""
+        return self.motion.fitting_q if self.tracking.filter_q is None else self.tracking.filter_q
+
+    @cached_property
+    def radius_m(self) -> float:
+        """Sensing radius; with a threshold, where the mean level is at it."""
+        return self.detection.distances_m(self.measurement)[0]
+
+    @cached_property
+    def reach_m(self) -> float:
+        """From here on a node detects nothing (with a threshold, less than once in a million periods)."""
+        return self.detection.distances_m(self.measurement)[1]
+
+    @property
+    def scored(self) -> int:
+        """Periods that rms_m is made of."""
+        return self.periods - self.unscored
+
+    @property
+    def handover_bits(self) -> int:
+        """Size of a handover: the estimate, or 5 numbers of 32 bits for every particle."""
+        return self.radio.handover_bits if self.radio.handover == "estimate" else 5 * 32 * self.tracking.particles
+
+    @classmethod
+    def of(cls, scenario: str | Scenario, /, **overrides) -> Scenario:
+        """A scenario from a preset's name or from a scenario, with overrides by quantity."""
+        return scenario.override(**overrides) if isinstance(scenario, cls) else cls.named(scenario, **overrides)
+
+    @classmethod
+    def named(cls, name: str, /, **overrides) -> Scenario:
+        """A preset, with overrides by quantity.
+
+        Args:
+            name: one of PRESETS, with or without "wsn_env/".
+            overrides: as for `override`.
+        """
+        short = name.removeprefix("wsn_env/")
+        if short not in PRESETS:
+            raise ScenarioError(f"scenario {name!r} is unknown: {suggest(short, PRESETS)}")
+        return PRESETS[short].override(**overrides)
+
+    def override(self, **changes) -> Scenario:
+        """A copy with some quantities changed, whatever section they stand in.
+
+        Sections are given whole or, where there are several kinds, by name: `override(nodes=400, motion="sine",
+        amplitude_m=20, tracker="ekf")`. An unknown keyword raises and suggests. `calibration=FILE` stands for all
+        quantities that `wsn calibrate` wrote into the file. A replay without `periods` is as long as its recording.
+        """
+        if "calibration" in changes:
+            changes = read_quantities(changes.pop("calibration")) | changes
+        if changes.get("positions") is not None:
+            changes.setdefault("nodes", Field.nodes)  # the positions tell how many
+        whole = {}
+        for name, kinds in BY_NAME.items():
+            if isinstance(changes.get(name), str):
+                chosen = changes.pop(name)
+                if chosen not in kinds:
+                    raise ScenarioError(f"Scenario.{name} = {chosen!r}: {suggest(chosen, kinds)}")
+                own = {item.name for item in fields(kinds[chosen])}
+                whole[name] = kinds[chosen](**{key: changes.pop(key) for key in own & changes.keys()})
+        for item in fields(self):
+            if item.name in changes:
+                whole[item.name] = changes.pop(item.name)
+        known: dict[str, Any] = {}
+        for item in fields(self):
+            section = whole.get(item.name, getattr(self, item.name))
+            if is_dataclass(section):
+                own = {part.name for part in fields(section)}
+                known |= dict.fromkeys(own)
+                if own & changes.keys():
+                    whole[item.name] = replace(section, **{key: changes.pop(key) for key in own & changes.keys()})
+            else:
+                known[item.name] = None
+        if changes:
+            name = next(iter(changes))
+            raise ScenarioError(f"scenario has no quantity {name!r}: {suggest(name, known)}")
+        motion = whole.get("motion")
+        if isinstance(motion, Replay) and motion != self.motion and "periods" not in whole:
+            whole["periods"] = periods_of(motion.recording, whole.get("period_s", self.period_s))
+        return replace(self, **whole)  # at once: a tracker and what it reads may change together
+
+    def quantities(self) -> dict[str, Any]:
+        """Every quantity of every section by name."""
+        flat = {}
+        for item in fields(self):
+            value = getattr(self, item.name)
+            flat |= (
+                {f.name: getattr(value, f.name) for f in fields(value)} if is_dataclass(value) else {item.name: value}
+            )
+        return flat
+
+    def as_dict(self) -> dict[str, Any]:
+        """Nested plain values for JSON, with the chosen kind of motion and measurement."""
+        plain: dict[str, Any] = {}
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if is_dataclass(value):
+                plain[item.name] = {"kind": type(value).__name__} | {
+                    f.name: getattr(value, f.name) for f in fields(value)
+                }
+            else:
+                plain[item.name] = value
+        return plain
+
+
+PRESETS = {
+    "PreDC-v0": Scenario(name="PreDC-v0"),
+    "Rssi-v0": Scenario(name="Rssi-v0", reference_error_m=4.0, measurement=Rssi()),
+    "Binary-v0": Scenario(
+        name="Binary-v0",
+        periods=50,
+        lam=2.0,
+        typical_error_m=1.5,
+        reference_error_m=30.0,
+        reference_energy_mj=1.0,
+        field=Field(nodes=600, side_m=500.0),
+        motion=Crossing(margin_m=60.0, crossing_m=250.0, acceleration_ms2=0.1),
+        detection=Detection(radius_m=60.0, softness=1e-6, ceiling=1.0),
+        measurement=Binary(),
+        radio=Radio(receiver="sink", report_bits=64, invitation_bits=0),
+        tracking=Tracking(filter_q=0.3, start_sd_m=10.0, start_sd_ms=1.0, rest_sd_ms=10.0),
+    ),
+    "Anchors-v0": Scenario(
+        name="Anchors-v0",
+        lam=10.0,
+        typical_error_m=11.0,
+        reference_error_m=40.0,
+        reference_energy_mj=3.0,
+        periods=50,
+        field=Field(side_m=200.0, positions=RING_OF_EIGHT),
+        motion=Crossing(margin_m=20.0, crossing_m=80.0, acceleration_ms2=0.5),
+        detection=Detection(radius_m=360.0, ceiling=1.0),
+        measurement=Rssi(exponent=3.0),
+        radio=Radio(receiver="target", report_bits=128, invitation_bits=0, retries=0),
+        tracking=Tracking(filter_q=1.0, start_sd_m=10.0, start_sd_ms=1.0, search=False),
+    ),
+    "Underwater-v0": Scenario(
+        name="Underwater-v0",
+        period_s=5.0,
+        lam=0.006,
+        typical_error_m=16.0,
+        typical_energy_mj=1400.0,
+        reference_error_m=120.0,
+        reference_energy_mj=2200.0,
+        field=Field(nodes=64, side_m=1000.0, layout="grid"),
+        motion=Cruise(),
+        detection=Threshold(),
+        measurement=Sonar(),
+        radio=Modem(),
+        tracking=Tracking(
+            particles=1000,
+            silent_information=True,
+            resampling="spread",
+            start_sd_m=20.0,
+            start_sd_ms=1.0,
+        ),
+    ),
+    # The twelve receivers, the hall and the noise of Danis, Naskali, Cemgil & Ersoy (2022), calibrated on six tracks.
+    "Ble-v0": Scenario(
+        name="Ble-v0",
+        lam=0.006,
+        typical_error_m=1.8,
+        typical_energy_mj=194.0,
+        reference_error_m=5.0,
+        reference_energy_mj=220.0,
+        unscored=3,
+        field=Field(side_m=20.66, depth_m=17.641, positions=DONGLES),
+        motion=Walk(),
+        detection=Detection(),
+        measurement=Beacon(
+            at_1m_db=(-60.1, -57.2, -58.8, -60.4, -61.8, -55.2, -64.3, -56.8, -61.3, -60.0, -56.7, -57.3),
+            exponents=(1.57, 1.80, 1.56, 1.70, 1.58, 1.95, 1.93, 1.74, 1.34, 2.19, 1.29, 1.79),
+            heights_m=(1.22, 2.30, 2.30) * 4,
+            beacon_m=1.8,
+        ),
+        radio=Bluetooth(),
+        tracking=Tracking(
+            particles=1000,
+            start="field",
+            rest_sd_ms=0.4,
+            velocity_s=10.0,
+            resample_below=0.6,
+            search=False,
+        ),
+    ),
+}

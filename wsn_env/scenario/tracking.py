@@ -1,0 +1,114 @@
+"""How the target is tracked: the filter, its start, the search rule; every tracker by name, and what it can read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from wsn_env.models.quantity import Section, quantity
+from wsn_env.models.sections.beacon import Beacon
+from wsn_env.models.sections.sensing import Binary, Position, Rssi, RssiPower, Sonar
+
+MEASUREMENTS = {
+    "position": Position,
+    "rssi": Rssi,
+    "rssi_power": RssiPower,
+    "sonar": Sonar,
+    "binary": Binary,
+    "beacon": Beacon,
+}
+
+BOUNDARY_TRACKERS = ("boundary_raw", "boundary", "boundary_mid", "boundary_ekf", "centroid", "centroid_rls")
+TRACKERS = {  # name: where the class stands
+    "particle": "wsn_env.filters.particle:ParticleTracker",
+    "ekf": "wsn_env.filters.kalman:EKFTracker",
+    "snapshot": "wsn_env.filters.snapshot:SnapshotTracker",
+    "ukf": "wsn_env.filters.kalman:UKFTracker",
+    "ckf": "wsn_env.filters.cubature:CKFTracker",
+    "ickf": "wsn_env.filters.cubature:ICKFTracker",
+    "trilateration": "wsn_env.filters.trilateration:TrilaterationTracker",
+    "nonlinear_ls": "wsn_env.filters.trilateration:NonlinearLSTracker",
+    "grnn": "wsn_env.filters.grnn:GRNNTracker",
+    "grnn_kf": "wsn_env.filters.grnn:GRNNKalmanTracker",
+    **dict.fromkeys(BOUNDARY_TRACKERS, "wsn_env.filters.boundary:BoundaryTracker"),
+}
+READS = {  # name: the measurements that it can read
+    **dict.fromkeys(TRACKERS, (Position, Rssi, RssiPower, Sonar)),
+    **dict.fromkeys(("grnn", "grnn_kf"), (Rssi, RssiPower, Sonar)),
+    **dict.fromkeys(("trilateration", "nonlinear_ls"), (Rssi, RssiPower)),
+    **dict.fromkeys(BOUNDARY_TRACKERS, (Binary,)),
+    "particle": tuple(MEASUREMENTS.values()),
+}
+
+
+@dataclass(frozen=True)
+class Tracking(Section):
+    """The filter at the head, and the search rule for lost tracks.
+
+    An episode's first belief, `start`: "known" is N(truth, P0); "search" is what a search in period 0 finds; "field" is
+    the whole field with the target at rest; "fix" is the same, but a Gaussian filter (ekf, ukf, ckf, ickf, grnn_kf)
+    does not correct it: it begins with a fix of the first reports (see trackers/first_fix.py).
+    """
+
+    tracker: str = quantity("particle", " | ".join(TRACKERS), choices=tuple(TRACKERS))
+    particles: int = quantity(5000, "number of particles P", at_least=2, at_most=1_000_000, whole=True)
+    fusion: str = quantity("joint", "joint (members send z) or pooled (eqs. 9-15)", choices=("joint", "pooled"))
+    silent_information: bool = quantity(
+        False,
+        "weigh with who reported and who kept silent, too (particle only)",
+        choices=(True, False),
+    )
+    resample_below: float = quantity(
+        2 / 3, "resample at N_eff below this share of P (eq. 14); 1: always", at_least=0, at_most=1
+    )
+    resampling: str = quantity(
+        "systematic",
+        "systematic: copies of the chosen; spread: further copies lie about them in pairs",
+        choices=("systematic", "spread"),
+    )
+    spread_scale: float = quantity(
+        0.5, "spread: distance of the first pair, in sds of the cloud", at_least=0, at_most=10
+    )
+    redraw_on_handover: bool = quantity(
+        False,
+        "the new head draws its particles from the mean and covariance handed over (particle only)",
+        choices=(True, False),
+    )
+    filter_q: float | None = quantity(
+        None,
+        "sd of the filter's acceleration noise [m/s^2]; None: what suits the motion",
+        at_least=0,
+        at_most=1000,
+        optional=True,
+    )
+    velocity_s: float | None = quantity(
+        None,
+        "the filter's target walks in the room: its velocity is an Ornstein-Uhlenbeck process of sd rest_sd_ms and this"
+        " time constant, reflected at the walls; None: white acceleration of filter_q anywhere (particle only)",
+        above=0,
+        optional=True,
+    )
+    gate_m: float | None = quantity(
+        None,
+        "boundary trackers refuse what is off the prediction by more than this and three sds; None: nothing",
+        above=0,
+        optional=True,
+    )
+    start: str = quantity(
+        "known",
+        "known: mean ~ N(truth, P0); search: from a search; field: anywhere; fix: from a fix of the first reports",
+        choices=("known", "search", "field", "fix"),
+    )
+    start_sd_m: float = quantity(1.0, "position sd of P0", above=0, at_most=100_000)
+    start_sd_ms: float = quantity(0.1, "velocity sd of P0", above=0, at_most=1000)
+    rest_sd_ms: float = quantity(
+        1.0, "velocity sd of a target of which none is known yet (starts other than known)", above=0, at_most=1000
+    )
+    search: bool = quantity(True, "search for lost tracks", choices=(True, False))
+    search_miss: float = quantity(1e-3, "search when missing so long was less probable", above=0, at_most=1)
+    search_gap: int = quantity(5, "periods between searches, at least", at_least=1, at_most=10**9, whole=True)
+    width_search: str = quantity(
+        "golden", "how a fingerprint network's width is found: golden section or fruit flies", choices=("golden", "foa")
+    )
+    training_seed: int = quantity(
+        0, "seed of a fingerprint network's training, apart from every episode's", at_least=0, whole=True
+    )

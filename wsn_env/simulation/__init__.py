@@ -1,0 +1,1 @@
+"""The world: its state, a period, what policies may see of it."""

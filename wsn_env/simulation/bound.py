@@ -1,0 +1,268 @@
+"""How good an estimate could have been: the posterior Cramer-Rao bound of the reports that were really delivered.
+
+The recursion of Tichavsky, Muravchik & Nehorai (1998, eq. 21) for the constant velocity model,
+
+    J' = (F J^-1 F' + q^2 G G')^-1 + sum over the reports of H' R^-1 H
+
+with H at the true state. It runs on P = J^-1, since G G' is singular. P0 is the first belief's covariance, and q the
+target's own acceleration noise, not the filter's.
+
+The *floor* is the same for a network in which every node is awake throughout and every report arrives. It depends on
+field, track and key alone, so that it is one number an episode, whatever the schedule.
+
+Both are made of the truth: for loggers and tables, never for policies.
+"""
+
+import numpy as np
+
+from wsn_env.compiled.kernels import lean_kernel, lean_piece, over_rows, threads_for
+from wsn_env.models.physics import sensing
+from wsn_env.models.physics.constants import constants
+from wsn_env.models.physics.field import cells_within, squared_distance
+from wsn_env.models.physics.motion import predict_covariance
+from wsn_env.models.sections import Crossing, Cruise, Threshold
+from wsn_env.scenario import Scenario
+from wsn_env.simulation.episode import start_record
+from wsn_env.simulation.state import Outcome, State
+
+KINDS = ("bound", "reference", "none")
+MANY_ROWS = 512  # from here on the short work of a period is shared among threads
+
+MEMORY = np.dtype(
+    [
+        ("cov", "f8", (4, 4)),  # P after the last period
+        ("squares", "f8"),  # sum over the episode's periods of the squared bound [m^2]
+    ],
+    align=True,
+)
+
+
+def bound_kind(scenario: Scenario) -> str:
+    """What the recursion means in a scenario: one of KINDS.
+
+    "bound": no estimate from the values of the reports can do better on average. With positions it is exact, and that
+    of the Kalman filter that knows q. With strengths H is that of each episode's own track, which makes the mean over
+    episodes a little larger than the bound with H averaged.
+
+    "reference": the same recursion, but an estimate may do better, because
+    - the motion has no process noise of its own (the filter's q stands in), or
+    - the first belief is not the law of the truth about it (every start but "known"), or
+    - who reports and who keeps silent tells something beside the values: with a threshold on the level, and for
+      silent members with `silent_information`.
+
+    "none": binary sensors, since a bit that jumps at an edge has no Fisher information; and a beacon's levels, whose
+    errors last over periods.
+    """
+    if scenario.binary or scenario.hears:
+        return "none"
+    own_noise = isinstance(scenario.motion, (Crossing, Cruise))
+    tells_more = scenario.tracking.silent_information or isinstance(scenario.detection, Threshold)
+    return "bound" if own_noise and scenario.tracking.start == "known" and not tells_more else "reference"
+
+
+def process_noise(scenario: Scenario) -> float:
+    """sd of the target's own white acceleration [m/s^2]; the filter's where the motion has none."""
+    if isinstance(scenario.motion, (Crossing, Cruise)):
+        return scenario.motion.acceleration_ms2
+    return scenario.filter_q
+
+
+class Bound:
+    """The bounds of B rows, a period after the other.
+
+    `begin` at the start of an episode, then `advance` once a period; `episode_m` and `floor_m` at its end.
+    """
+
+    def __init__(self, scenario: Scenario, rows: int = 1, threads: int = 1):
+        """Prepare.
+
+        Args:
+            scenario: of any kind but "none".
+            rows: B.
+            threads: at most so many share the work. No bit depends on it.
+        """
+        if bound_kind(scenario) == "none":
+            kind = type(scenario.measurement).__name__
+            raise ValueError(f"Scenario.measurement = {kind}: has no Cramer-Rao bound; allowed are all others")
+        self.kind = bound_kind(scenario)
+        self._periods, self._threads = scenario.periods, threads
+        self._constants, self._start = constants(scenario), start_record(scenario)
+        self._constants["q"] = process_noise(scenario)
+        if isinstance(scenario.detection, Threshold):
+            self._constants["reach_m"] = np.inf  # noise lifts a level over the threshold from anywhere
+        self._asked_first = scenario.tracking.start == "search"
+        self._memory = np.zeros(rows, MEMORY)
+
+    def begin(self, state: State, rows=None) -> np.ndarray:
+        """New episodes; a search in period 0 counts.
+
+        Args:
+            state: in period 0 of them.
+            rows: (B,) bool, which; None: all.
+
+        Returns: (B,) the bound now [m]; of other rows as it was.
+        """
+        rows = np.ones(len(self._memory), bool) if rows is None else np.asarray(rows, bool)
+        bound_m = np.empty(len(rows))
+        told = state.track, state.network.positions, state.reports.count, state.reports.node
+        _begin(0, len(rows), self._constants, self._start, rows, *told, self._memory, bound_m)
+        return bound_m
+
+    def advance(self, state: State, outcome: Outcome) -> np.ndarray:
+        """One period.
+
+        Args:
+            state: after it.
+            outcome: what it brought.
+
+        Returns: (B,) root of the trace of P's position part [m].
+        """
+        rows = len(self._memory)
+        bound_m = np.empty(rows)
+        told = outcome.row, state.network.positions, state.reports.node
+        if rows < MANY_ROWS:
+            _advance(0, rows, self._constants, *told, self._memory, bound_m)
+        else:
+            over_rows(_advance, rows, self._threads, self._constants, *told, self._memory, bound_m)
+        return bound_m
+
+    def episode_m(self) -> np.ndarray:
+        """(B,) root of the mean square over the horizon of what `advance` has returned [m]."""
+        return np.sqrt(self._memory["squares"] / self._periods)
+
+    def floor_m(self, state: State, rows=None) -> np.ndarray:
+        """What all nodes would have told, awake throughout: the root of the mean square over the horizon [m].
+
+        Args:
+            state: in any period of the episode.
+            rows: (B,) bool, which; None: all.
+
+        Returns: (B,), 0 in other rows.
+        """
+        rows = np.ones(state.rows, bool) if rows is None else np.asarray(rows, bool)
+        floor_m, memory = np.zeros(len(rows)), np.zeros(len(rows), MEMORY)
+        world = state.key, state.track, state.network.positions, state.network.grid
+        arguments = self._constants, self._start, self._asked_first, rows, *world, memory, floor_m
+        over_rows(_floors, len(rows), threads_for(rows, self._threads), *arguments)
+        return floor_m
+
+
+@lean_kernel
+def _begin(start, stop, cs, starts, rows, track, positions, counts, nodes, memory, bound_m):
+    for b in range(start, stop):
+        own = memory[b]
+        if rows[b]:
+            _start_anew(own, starts[0])
+            xx, xy, yy = _information_of(counts[b], nodes[b], positions[b], track[b, 0, 0], track[b, 0, 2], cs[0])
+            _correct(own.cov, xx, xy, yy)
+        bound_m[b] = np.sqrt(own.cov[0, 0] + own.cov[2, 2])
+
+
+@lean_kernel
+def _advance(start, stop, cs, outcomes, positions, nodes, memory, bound_m):
+    for b in range(start, stop):
+        out = outcomes[b]
+        xx, xy, yy = _information_of(out.delivered, nodes[b], positions[b], out.target_m[0], out.target_m[1], cs[0])
+        bound_m[b] = np.sqrt(_take_period(memory[b], xx, xy, yy, cs[0]))
+
+
+@lean_kernel
+def _floors(start, stop, cs, starts, asked_first, rows, key, track, positions, grid, memory, floor_m):
+    for b in range(start, stop):
+        if not rows[b]:
+            continue
+        own, periods = memory[b], track.shape[1] - 1
+        _start_anew(own, starts[0])
+        if asked_first:
+            xx, xy, yy = _information_of_all(key[b], 0, positions[b], grid, b, track[b, 0], cs[0])
+            _correct(own.cov, xx, xy, yy)
+        for k in range(1, periods + 1):
+            xx, xy, yy = _information_of_all(key[b], k, positions[b], grid, b, track[b, k], cs[0])
+            _take_period(own, xx, xy, yy, cs[0])
+        floor_m[b] = np.sqrt(own.squares / periods)
+
+
+@lean_piece
+def _start_anew(own, s):
+    """P0, as the episode's first belief has it."""
+    own.cov[:] = 0.0
+    own.cov[0, 0] = own.cov[2, 2] = s.sd_m * s.sd_m
+    own.cov[1, 1] = own.cov[3, 3] = s.sd_ms * s.sd_ms
+    own.squares = 0.0
+
+
+@lean_piece
+def _take_period(own, xx, xy, yy, c):
+    """Predict, correct; returns the trace of the position part."""
+    predict_covariance(own.cov, c.period_s, c.q, own.cov)
+    _correct(own.cov, xx, xy, yy)
+    square = own.cov[0, 0] + own.cov[2, 2]
+    own.squares += square
+    return square
+
+
+@lean_piece
+def _information(node, positions, x, y, c):
+    """H' R^-1 H of one report about the position: its xx, xy and yy [1/m^2]."""
+    weight = 1.0 / (c.noise * c.noise)
+    if c.model == sensing.POSITION:
+        return weight, 0.0, weight
+    dx, dy = x - positions[node, 0], y - positions[node, 1]
+    slope = sensing.strength_slope(dx * dx + dy * dy, c)
+    weight *= slope * slope
+    return weight * dx * dx, weight * dx * dy, weight * dy * dy
+
+
+@lean_piece
+def _information_of(count, nodes, positions, x, y, c):
+    """Of the period's reports."""
+    xx, xy, yy = 0.0, 0.0, 0.0
+    for k in range(count):
+        one = _information(nodes[k], positions, x, y, c)
+        xx, xy, yy = xx + one[0], xy + one[1], yy + one[2]
+    return xx, xy, yy
+
+
+@lean_piece
+def _information_of_all(key, period, positions, grid, b, truth, c):
+    """Of every node that would detect the target, if it were awake."""
+    x, y, place, starts = truth[0], truth[2], grid.row[b], grid.starts[b]
+    stream = sensing.detection_stream(key, period, c)
+    first, last, left, right = cells_within(place, x, y, c.reach_m)
+    xx, xy, yy = 0.0, 0.0, 0.0
+    for line in range(first, last + 1):
+        for slot in range(starts[line * place.side + left], starts[line * place.side + right + 1]):
+            node = grid.nodes[b, slot]
+            squared = squared_distance(positions, node, x, y)
+            if sensing.detects_by(stream, node, squared, c):
+                one = _information(node, positions, x, y, c)
+                xx, xy, yy = xx + one[0], xy + one[1], yy + one[2]
+    return xx, xy, yy
+
+
+@lean_piece
+def _correct(cov, xx, xy, yy):
+    """(P^-1 + J)^-1 for information J about the position, in place: two rank-one corrections, by J = L D L'."""
+    first, second, most, least = (0, 2, xx, yy) if xx >= yy else (2, 0, yy, xx)
+    if most > 0.0:
+        tilt = xy / most
+        _correct_along(cov, first, second, tilt, most)
+        rest = least - tilt * xy
+        if rest > 0.0:
+            _correct_along(cov, second, first, 0.0, rest)
+
+
+@lean_piece
+def _correct_along(cov, i, j, tilt, information):
+    """Of a measurement of x_i + tilt x_j."""
+    spread = cov[i, i] + tilt * (2.0 * cov[i, j] + tilt * cov[j, j])
+    gain = information / (1.0 + information * spread)
+    moved = (
+        cov[0, i] + tilt * cov[0, j],
+        cov[1, i] + tilt * cov[1, j],
+        cov[2, i] + tilt * cov[2, j],
+        cov[3, i] + tilt * cov[3, j],
+    )
+    for k in range(4):
+        for n in range(4):
+            cov[k, n] -= gain * (moved[k] * moved[n])

@@ -1,0 +1,199 @@
+"""What policies and observations may see: belief, delivered reports, batteries, geometry, the standing cluster.
+
+Nothing here depends on the truth but through reports. A view shares its arrays with the state it was made from and is
+valid until that state is stepped with donate=True.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from wsn_env.models.physics import field as geometry
+from wsn_env.simulation.state import BELIEF, NETWORK, RECEIVER, STATE, Cluster, Grid, Network, Reports, State
+
+HEARING = ("latest_db", "gradient", "variance")  # of a beacon's receivers, what policies ask for
+
+
+def _field(array: str, name: str, meaning: str):
+    return property(lambda view: getattr(view, array)[name], doc=meaning)
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """The network's knowledge before it chooses the cluster of the next period; all arrays lead with B."""
+
+    row: np.ndarray  # (B,) STATE
+    belief: np.ndarray  # (B,) BELIEF
+    network: Network
+    reports: Reports
+    receivers: np.ndarray  # (B, S) RECEIVER of a beacon; else (B, 0)
+    _nearest: dict = field(default_factory=dict, repr=False)
+
+    period = _field("row", "period", "(B,) periods done.")
+    lam = _field("row", "lam", "(B,) m/mJ.")
+    luck = _field("row", "luck", "(B,) uint32: a random number of the period.")
+    log_miss = _field("row", "log_miss", "(B,) log probability of so long a silence.")
+    mean = _field("belief", "mean", "(B, 4) x, vx, y, vy after the last correction.")
+    cov = _field("belief", "cov", "(B, 4, 4).")
+    predicted_mean = _field("belief", "predicted_mean", "(B, 4) for the period to come.")
+    predicted_cov = _field("belief", "predicted_cov", "(B, 4, 4).")
+
+    @classmethod
+    def of(cls, state: State) -> View:
+        """The view of a state."""
+        return cls(state.row, state.belief.row, state.network, state.reports, state.belief.receivers)
+
+    @property
+    def positions(self) -> np.ndarray:
+        """(B, S, 2) m."""
+        return self.network.positions
+
+    @property
+    def battery(self) -> np.ndarray:
+        """(B, S) J."""
+        return self.network.battery
+
+    @property
+    def head(self) -> np.ndarray:
+        """(B,) the standing head; -1: none."""
+        return self.network.row["head"]
+
+    @property
+    def rows(self) -> np.ndarray:
+        """(B,) 0, 1, ..., for indexing."""
+        return np.arange(len(self.period))
+
+    @cached_property
+    def alive(self) -> np.ndarray:
+        """(B, S) bool."""
+        return self.battery > 0
+
+    @cached_property
+    def member(self) -> np.ndarray:
+        """(B, S) bool: the standing cluster, head included."""
+        mask = _mask(self.network.members, self.network.n_members)
+        rows = np.flatnonzero(self.head >= 0)
+        mask[rows, self.head[rows]] = True
+        return mask
+
+    @cached_property
+    def detected(self) -> np.ndarray:
+        """(B, S) bool: whose reports the head had in the last period, its own included."""
+        return _mask(self.reports.node, self.reports.count)
+
+    @cached_property
+    def sees(self) -> np.ndarray:
+        """(B, S) bool: who detected the target in the last period: `detected`; of binary sensors those that were awake,
+        or asked in a search, and whose state is 1."""
+        if not self.reports.bitmap.shape[1]:
+            return self.detected
+        return (self.reports.bitmap > 0) & (self.member | self.detected)
+
+    @cached_property
+    def measured(self) -> np.ndarray:
+        """(B, S, 2): what they reported, zero elsewhere."""
+        values = np.zeros(self.positions.shape)
+        rows, slots = np.nonzero(np.arange(self.reports.node.shape[1]) < self.reports.count[:, None])
+        values[rows, self.reports.node[rows, slots]] = self.reports.value[rows, slots]
+        return values
+
+    @property
+    def prediction(self) -> np.ndarray:
+        """(B, 2) where the target should be in the period to come [m]."""
+        return self.predicted_mean[:, ::2]
+
+    @property
+    def spread_m(self) -> np.ndarray:
+        """(B,) E = max of the predicted position sds (eq. 16) [m]."""
+        return np.sqrt(np.maximum(self.predicted_cov[:, 0, 0], self.predicted_cov[:, 2, 2]))
+
+    @cached_property
+    def distance(self) -> np.ndarray:
+        """(B, S) of the nodes to the prediction [m]."""
+        return geometry.distances_to(self.positions, self.prediction)
+
+    def nearest(self, count: int, ring_m: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """The living nodes nearest to the prediction, or to a ring about it: (B, count) nodes, -1 for none, and their
+        distances to the prediction [m]."""
+        if (count, ring_m) not in self._nearest:
+            self._nearest[count, ring_m] = geometry.nearest(self.network, self.prediction, count, ring_m)
+        return self._nearest[count, ring_m]
+
+    def remember_nearest(self, nodes: np.ndarray, distances: np.ndarray, ring_m: float = 0.0) -> None:
+        """What a kernel has found in passing."""
+        self._nearest[nodes.shape[1], ring_m] = nodes, distances
+
+    def nearest_living(self) -> np.ndarray:
+        """(B,) the living node nearest to the prediction; -1: none is alive."""
+        return self.nearest(1)[0][:, 0]
+
+    def as_arrays(self) -> dict[str, np.ndarray]:
+        """Fresh arrays of fixed shape, the content of the observation "view"."""
+        arrays = {
+            "period": self.period.astype(np.int64),
+            "lam": self.lam[:, None].copy(),
+            "luck": self.luck[:, None].astype(np.int64),
+            "log_miss": self.log_miss[:, None].copy(),
+            "mean": self.mean.copy(),
+            "cov": self.cov.copy(),
+            "predicted_mean": self.predicted_mean.copy(),
+            "predicted_cov": self.predicted_cov.copy(),
+            "positions": self.positions.copy(),
+            "battery": self.battery.copy(),
+            "head": self.head.copy(),
+            "member": self.member.astype(np.int8),
+            "detected": self.detected.astype(np.int8),
+            "measured": self.measured.copy(),
+        }
+        if self.receivers.shape[1]:
+            arrays |= {name: self.receivers[name].copy() for name in HEARING}
+        return arrays | ({"bitmap": self.reports.bitmap.copy()} if self.reports.bitmap.shape[1] else {})
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, np.ndarray]) -> View:
+        """The view back from `as_arrays`; of one environment too, whose arrays lack the leading B."""
+        a = {name: np.asarray(value) for name, value in arrays.items()}
+        if a["battery"].ndim == 1:
+            a = {name: value[None] for name, value in a.items()}
+        rows, nodes = a["battery"].shape
+        others = a["member"].astype(bool)
+        row, belief, network_row = np.zeros(rows, STATE), np.zeros(rows, BELIEF), np.zeros(rows, NETWORK)
+        for name in ("period", "lam", "luck", "log_miss"):
+            row[name] = a[name].reshape(rows)
+        for name in ("mean", "cov", "predicted_mean", "predicted_cov"):
+            belief[name] = a[name]
+        network_row["alive"] = (a["battery"] > 0).sum(axis=1)
+        network_row["head"] = a["head"].reshape(rows)
+        standing = np.flatnonzero(network_row["head"] >= 0)
+        others[standing, network_row["head"][standing]] = False
+        members, network_row["n_members"] = _lists(others)
+        node, count = _lists(a["detected"].astype(bool))
+        value = np.take_along_axis(a["measured"], np.maximum(node, 0)[:, :, None].astype(np.int64), axis=1)
+        grid = Grid.zeros(rows, nodes)
+        positions = np.ascontiguousarray(a["positions"], np.float64)
+        geometry.index(positions, grid)
+        network = Network(network_row, positions, a["battery"], members, grid)
+        bitmap = a.get("bitmap", np.zeros((rows, 0), np.int8))
+        receivers = np.zeros((rows, nodes if HEARING[0] in a else 0), RECEIVER)
+        for name in HEARING if receivers.size else ():
+            receivers[name] = a[name]
+        return cls(row, belief, network, Reports(count, node, value, bitmap), receivers)
+
+
+def _mask(nodes: np.ndarray, count: np.ndarray) -> np.ndarray:
+    """(B, S) bool from the first `count` entries of (B, S) indices."""
+    mask = np.zeros(nodes.shape, dtype=bool)
+    rows, slots = np.nonzero(np.arange(nodes.shape[1]) < count[:, None])
+    mask[rows, nodes[rows, slots]] = True
+    return mask
+
+
+def _lists(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The inverse of `_mask`: indices (B, S) int32 and counts."""
+    nodes = np.zeros(mask.shape, dtype=np.int32)
+    found = Cluster.of(np.zeros(len(mask)), mask).members
+    nodes[:, : found.shape[1]] = np.maximum(found, 0)
+    return nodes, mask.sum(axis=1)

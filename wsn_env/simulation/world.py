@@ -1,0 +1,143 @@
+"""The world: reset and step, batch-first and pure. `World.step` is the whole story of a period."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wsn_env.compiled import kernels as compiling
+from wsn_env.compiled.kernels import available_threads, over_rows, threads_for
+from wsn_env.filters import make_tracker
+from wsn_env.filters.particle import ParticleTracker
+from wsn_env.models.physics.constants import constants
+from wsn_env.models.physics.motion import motion_parameters
+from wsn_env.scenario import Scenario
+from wsn_env.simulation import episode, period, search
+from wsn_env.simulation.state import OUTCOME, Cluster, Outcome, State
+
+LONG_LIST = 64
+
+
+class World:
+    """A scenario brought to life. Holds no state of its own: every method is a function of its arguments."""
+
+    def __init__(self, scenario: Scenario, threads: int | None = None, fast: bool = False):
+        """Prepare a scenario.
+
+        Args:
+            scenario: what to simulate.
+            threads: at most so many share a large batch; None: every core that the process may use. The bits of
+                a result do not depend on it.
+            fast: let the compiler regroup the particle filter's sums: quicker, equal to rounding, but with other bits
+                on other processors. The world itself stays as it is.
+        """
+        self.scenario = scenario
+        self.threads = threads or available_threads()
+        self.tracker = make_tracker(scenario, self.threads, fast)
+        self._run = compiling.fast(period.run) if fast else period.run
+        self._constants = constants(scenario)
+        self._beginning = (
+            *motion_parameters(scenario),
+            episode.start_record(scenario),
+            episode.placed_nodes(scenario),
+            *episode.beacon_of(scenario),
+        )
+
+    def reset(self, keys) -> State:
+        """New episodes.
+
+        Args:
+            keys: (B,) uint64, one a row: they fix field, track and every draw to come.
+        """
+        keys = np.atleast_1d(np.asarray(keys, dtype=np.uint64))
+        return self.restart(self.allocate(len(keys)), np.ones(len(keys), bool), keys, donate=True)[0]
+
+    def allocate(self, rows: int) -> State:
+        """Arrays for `restart` to begin episodes in."""
+        s = self.scenario
+        return State.zeros(rows, s.field.nodes, s.periods, self.tracker.particles, s.binary, s.hears)
+
+    def restart(self, state: State, rows, keys, donate: bool = False) -> tuple[State, Outcome]:
+        """New episodes in some rows of a batch; the others stay, but for the ledger of their last period.
+
+        Args:
+            state: the batch.
+            rows: (B,) bool, which to start anew.
+            keys: (B,) uint64, read where `rows` is True.
+            donate: reuse the given state's arrays.
+
+        Returns: the state, and an outcome that holds the search of `start="search"` and zeros else.
+        """
+        rows, keys = np.asarray(rows, dtype=bool), np.asarray(keys, dtype=np.uint64)
+        if not rows.shape == keys.shape == (state.rows,):
+            raise ValueError(f"rows {rows.shape} and keys {keys.shape}: must both be ({state.rows},)")
+        state = state if donate else state.copy()
+        outcome = _nothing_yet(state)
+        self._in_rows(rows, episode.begin, keys, *self._beginning, state)
+        self.tracker.start(state.key, state.period.copy(), rows, state.belief)
+        if self.scenario.tracking.start == "search":
+            self._search(rows, state, outcome)
+        self._in_rows(rows, period.settle, state, outcome)
+        if self.scenario.hears:
+            self._in_rows(rows, period.foretell_rows, self.tracker.maps, state.belief, state.network.positions)
+        return state, outcome
+
+    def step(self, state: State, cluster: Cluster, donate: bool = False) -> tuple[State, Outcome]:
+        """One sampling period for every row.
+
+        Args:
+            state: where the rows stand.
+            cluster: the choice; dead or repeated members are dropped and counted, a dead head is replaced by the
+                standing one or, if there is none, by the living node nearest to the prediction.
+            donate: reuse the given state's arrays. Both give the same bits.
+
+        Returns: the state after the period, and what it brought and cost.
+        """
+        state = state if donate else state.copy()
+        outcome = _nothing_yet(state)
+        heads, members = _choice(cluster, state)
+        lost = np.zeros(state.rows, bool)
+        # Handover and invitations; the target moves; members sense and report; the head predicts and corrects;
+        # broadcast, costs, and the prediction for the next period, unless a row must search first.
+        if isinstance(self.tracker, ParticleTracker):  # all in one compiled call
+            known = self._constants, self.tracker.maps
+            arrays = heads, members, lost, outcome.row, *state.arrays()
+            n_lost = over_rows(self._run, state.rows, self.threads, *known, *arrays)
+        else:
+            self._over_rows(period.sense_and_report, heads, members, state, outcome)
+            resampled = np.zeros(state.rows, bool)
+            self.tracker.correct(state.key, state.period.copy(), state.belief, state.network, state.reports, resampled)
+            n_lost = self._over_rows(period.conclude, resampled, lost, state, outcome)
+        if n_lost:
+            self._search(lost, state, outcome)
+            self._in_rows(lost, period.settle, state, outcome)
+        return state, outcome
+
+    def _search(self, rows, state: State, outcome: Outcome) -> None:
+        found = np.zeros(state.rows, bool)
+        self._in_rows(rows, search.search, found, state, outcome)
+        self.tracker.relocate(state.key, state.period.copy(), found, state.belief)
+
+    def _over_rows(self, kernel, *arguments) -> int:
+        return over_rows(kernel, len(arguments[0]), self.threads, self._constants, *arguments)  # all lead with B
+
+    def _in_rows(self, rows, kernel, *arguments) -> None:
+        over_rows(kernel, len(rows), threads_for(rows, self.threads), self._constants, rows, *arguments)
+
+
+def _nothing_yet(state: State) -> Outcome:
+    return Outcome(np.zeros(state.rows, OUTCOME), state.ledger.spent_j)
+
+
+def _choice(cluster: Cluster, state: State) -> tuple[np.ndarray, np.ndarray]:
+    """Heads (B,) and members (B, M) as kernels take them."""
+    heads, members = np.ascontiguousarray(cluster.head, np.int64), np.asarray(cluster.members)
+    if heads.shape != (state.rows,) or members.ndim != 2 or len(members) != state.rows:
+        raise ValueError(
+            f"cluster has head {heads.shape}, members {members.shape}: must be ({state.rows},), ({state.rows}, M)"
+        )
+    if members.dtype != np.int32:  # numbers that 32 bits would wrap are no nodes
+        nodes = state.network.battery.shape[1]
+        members = np.where((members < -1) | (members > nodes), nodes, members)
+    if members.shape[1] > LONG_LIST:  # kernels sort short lists
+        members = np.sort(members, axis=1)
+    return heads, np.ascontiguousarray(members, np.int32)
