@@ -44,10 +44,12 @@ def chosen(cluster: Cluster, row: int) -> set[int]:
 
 
 def test_every_name_is_an_entry_point():
-    expected = {f"{family}{n}" for family in ("nearest", "informed") for n in range(9)}
-    expected |= set("adaptive adaptive_informed greedy pre_dc boundary centroid static_cluster".split())
+    expected = set("adaptive adaptive_informed greedy informed nearest pre_dc boundary centroid static_cluster".split())
     expected |= set("strongest_signal strongest quadrants every random all planner ppo".split())
     assert expected <= set(policy_names())
+    for name, n, order in (("nearest4", 4, "nearest"), ("informed12", 12, "information")):
+        made = make_policy(name, SCENARIO)
+        assert (made.n, made.order) == (n, order) and made == make_policy(f"{name.rstrip('0123456789')}:n={n}", SCENARIO)
     with pytest.raises(ValueError, match="did you mean pre_dc"):
         make_policy("predc", SCENARIO)
 
@@ -288,7 +290,7 @@ def test_a_package_of_ones_own_adds_a_policy(tmp_path):
     info = tmp_path / "mine-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[wsn_env.evaluation.policies]\nlazy = mine:lazy\n")
+    (info / "entry_points.txt").write_text("[wsn_env.policies]\nlazy = mine:lazy\n")
     code = (
         f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
         "from wsn_env import Scenario, make_policy\n"

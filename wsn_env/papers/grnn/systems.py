@@ -13,7 +13,8 @@ from wsn_env.models.physics.field import fixed_positions
 from wsn_env.models.physics.sensing import linearised_strengths
 from wsn_env.models.sections import Detection, Legs, Rssi
 from wsn_env.papers.rollout import Record, Trial, play_all
-from wsn_env.scenario import RING_OF_EIGHT, Scenario
+from wsn_env.scenario import Scenario
+from wsn_env.scenario.scenario import RING_OF_EIGHT
 from wsn_env.simulation.world import World
 
 PERIODS_S = (0.1, 0.2, 0.5, 1.0)
