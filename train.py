@@ -187,7 +187,7 @@ def train(settings: Training) -> None:
 
 def complete(settings: Training) -> Scenario:
     """Fill in what was left out, by scenario, and return that."""
-    if settings.tracks and Scenario.named(settings.scenario).hears:
+    if settings.tracks and Scenario.named(settings.scenario).measurement.lasting_errors:
         raise ValueError(
             f"train.py: tracks: {settings.scenario} is trained in its simulated form; wsn evaluate replays"
         )

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wsn_env.models.physics.sensing import detection_probability
+from wsn_env.models.state import KEEP_CLUSTER, Cluster
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.state import KEEP_CLUSTER, Cluster
+from wsn_env.scenario.sensing import detection_probability
 from wsn_env.simulation.view import View
 
 
@@ -47,5 +47,5 @@ class ViewPolicy:
 
     def detection(self, view: View) -> np.ndarray:
         """(B, S) detection probability of the living nodes at the prediction."""
-        p = detection_probability(view.distance, self.scenario.detection, self.scenario.measurement)
+        p = detection_probability(view.distance, self.scenario)
         return np.where(view.alive, p, 0.0)

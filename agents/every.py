@@ -8,7 +8,7 @@ import numpy as np
 from wsn_env.agents.base import ViewPolicy
 
 from wsn_env.models.quantity import check_quantity
-from wsn_env.simulation.state import NOBODY, Cluster
+from wsn_env.models.state import NOBODY, Cluster
 from wsn_env.simulation.view import View
 
 

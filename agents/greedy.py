@@ -11,13 +11,14 @@ from wsn_env.agents.base import ViewPolicy
 from wsn_env.agents.tuned import nearest_lam, tuned
 
 from wsn_env.compiled.kernels import kernel, piece
-from wsn_env.envs.merit import chance, gain, price_mj
-from wsn_env.models.physics.constants import constants
-from wsn_env.models.physics.field import squared_distance
-from wsn_env.models.physics.radio import TO_HEAD, in_one_hop, relayed, transmission
-from wsn_env.models.physics.sensing import BINARY
+from wsn_env.envs.merit import chance_of, gain, price_mj
+from wsn_env.models.field import squared_distance
+from wsn_env.models.measurement.base import informs
 from wsn_env.models.quantity import check_quantity
-from wsn_env.simulation.state import Cluster, Sensors
+from wsn_env.models.radio.base import reception, relayed, transmission
+from wsn_env.models.state import Cluster, Sensors, knowledge_at
+from wsn_env.scenario.constants import constants
+from wsn_env.simulation.messages import in_one_hop
 from wsn_env.simulation.view import View
 
 CANDIDATES = 12
@@ -64,29 +65,31 @@ class Greedy(ViewPolicy):
         nodes = view.nearest(CANDIDATES, self.scenario.ring_m)[0]
         heads, members = view.nearest_living().copy(), np.empty((len(nodes), CANDIDATES), np.int32)
         numbers = view.lam / terms[:, 1], 1.0 / terms[:, 2]
-        standing = view.head.copy(), view.network.members, view.network.row["n_members"].copy()
-        known = constants(self.scenario), view.positions, view.receivers, view.belief
-        _bargain(0, len(nodes), *known, *standing, *numbers, nodes, heads, members)
+        known = constants(self.scenario), view.knowledge.handle
+        _bargain(0, len(nodes), *known, *numbers, nodes, heads, members)
         return Cluster(heads, members)
 
 
 @kernel
-def _bargain(start, stop, cs, positions, receivers, beliefs, old, awake, n_awake, lams, parts, nodes, heads, members):
+def _bargain(start, stop, cs, handle, lams, parts, nodes, heads, members):
     """Fill members (B, K), and put the standing head into heads (B,), which hold its rival, where it does no worse.
 
     Args:
-        old, awake, n_awake: the standing head, -1 for none, and members.
+        handle: of what the network knows (Knowledge).
         lams: (B,) price of energy over worth of information [m/mJ].
         parts: (B,) share of what invitations and handovers cost that the period bears.
         nodes: (B, K) candidates, -1: none.
     """
     stay = np.empty(nodes.shape[1], np.int32)
+    known, c = knowledge_at(handle), cs[0]
     for b in range(start, stop):
-        sensors = Sensors(positions[b], receivers[b])
-        given = sensors, beliefs[b], old[b], awake[b, : n_awake[b]], lams[b], parts[b], nodes[b], cs[0]
-        moved = _gather(heads[b], members[b], *given)
-        if old[b] >= 0 and old[b] != heads[b] and _gather(old[b], stay, *given) >= moved:
-            heads[b], members[b] = old[b], stay
+        network, belief = known.network, known.belief[b]
+        sensors, old = Sensors(network.positions[b], known.receivers[b]), network.row[b].head
+        awake, lam, part = network.members[b, : network.row[b].n_members], lams[b], parts[b]
+        moved = _gather(heads[b], members[b], sensors, belief, old, awake, lam, part, nodes[b], c)
+        if old >= 0 and old != heads[b]:
+            if _gather(old, stay, sensors, belief, old, awake, lam, part, nodes[b], c) >= moved:
+                heads[b], members[b] = old, stay
 
 
 @piece
@@ -97,7 +100,7 @@ def _gather(head, chosen, sensors, belief, old, awake, lam, part, nodes, c):
     chosen[:] = -1
     if head < 0:
         return 0.0
-    detection = chance(sensors, head, mean, cov, c)
+    detection = chance_of(sensors, head, mean, cov, c)
     drop, q00, q01, q11 = gain(detection, sensors, head, mean, cov, p00, p01, p11, c)
     total = np.sqrt(p00 + p11) - np.sqrt(max(p00 + p11 - drop, 0.0)) - lam * part * _handover_mj(old, head, sensors, c)
     p00, p01, p11 = q00, q01, q11
@@ -108,8 +111,8 @@ def _gather(head, chosen, sensors, belief, old, awake, lam, part, nodes, c):
         node = nodes[k]
         if node < 0 or node == head or not in_one_hop(node, head, sensors.positions, c):
             continue
-        detections[k] = chance(sensors, node, mean, cov, c)
-        if detections[k] > LEAST_DETECTION or c.model == BINARY:  # out of reach only a bit tells
+        detections[k] = chance_of(sensors, node, mean, cov, c)
+        if informs(c.measurement, detections[k]) > LEAST_DETECTION:
             called = _invitation_mj(node, head, old, awake, sensors, c)
             prices[k] = lam * (price_mj(detections[k], sensors, node, head, mean, c) + part * called)
     for slot in range(size):
@@ -132,10 +135,10 @@ def _gather(head, chosen, sensors, belief, old, awake, lam, part, nodes, c):
 @piece
 def _handover_mj(old, head, sensors, c):
     """From the standing head, if there is one; a sink or the target needs none."""
-    if c.receiver != TO_HEAD or old < 0 or old == head:
+    if not c.radio.to_head or old < 0 or old == head:
         return 0.0
     squared = squared_distance(sensors.positions, old, sensors.positions[head, 0], sensors.positions[head, 1])
-    return 1e3 * (relayed(c.handover_bits, squared, c) + c.handover_bits * c.rx_j_per_bit)
+    return 1e3 * (relayed(c.radio, c.radio.handover_bits, squared) + reception(c.radio, c.radio.handover_bits))
 
 
 @piece
@@ -144,10 +147,10 @@ def _invitation_mj(node, head, old, awake, sensors, c):
     called = node != old
     for member in awake:
         called &= member != node
-    hearing = c.invitation_bits * c.rx_j_per_bit
-    if c.receiver != TO_HEAD:
+    hearing = reception(c.radio, c.radio.invitation_bits)
+    if not c.radio.to_head:
         return 1e3 * hearing * called
     if not called and head == old:
         return 0.0
     squared = squared_distance(sensors.positions, node, sensors.positions[head, 0], sensors.positions[head, 1])
-    return 1e3 * (transmission(c.invitation_bits, squared, c) + hearing)
+    return 1e3 * (transmission(c.radio, c.radio.invitation_bits, squared) + hearing)

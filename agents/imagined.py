@@ -11,11 +11,11 @@ from wsn_env.compiled import draws
 from wsn_env.compiled.kernels import kernel, lean_piece, piece
 from wsn_env.filters.kernels import redraw_row
 from wsn_env.filters.resampling import correlated, lower_root
-from wsn_env.models.physics.constants import constants
-from wsn_env.models.physics.motion import advance
-from wsn_env.models.physics.sensing import POSITION, strength, strength_slope
+from wsn_env.models.measurement.base import linearise, node_at, unwrap
+from wsn_env.models.motion.prediction import advance
+from wsn_env.models.state import Belief, Network, Reports, State, knowledge_at, state_at
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.state import Belief, Network, Reports, State, network_of, state_of
+from wsn_env.scenario.constants import constants
 from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World
 
@@ -49,13 +49,13 @@ def draw_worlds(state: State, view: View, world: World, first: int, count: int) 
         world: of the `imagined_world`.
     """
     about = world.scenario.filter_q, world.scenario.period_s, world.scenario.tracking.search_gap
-    known = view.row, view.belief, view.reports.bitmap, *view.network.arrays()
-    _draw_worlds(first, count, *about, state.arrays(), known)
+    _draw_worlds(first, count, *about, state.handle, view.knowledge.handle)
 
 
 @kernel
-def _draw_worlds(first, count, q, period_s, search_gap, arrays, known):
-    state, row, belief, bitmap, network = state_of(arrays), known[0][0], known[1][0], known[2][0], network_of(known[3:])
+def _draw_worlds(first, count, q, period_s, search_gap, handle, knowledge_handle):
+    state, known = state_at(handle), knowledge_at(knowledge_handle)
+    row, belief, bitmap = known.row[0], known.belief[0], known.reports.bitmap[0]
     for b in range(len(state.key)):
         number = first + b % count
         key, pair = _world_key(row.luck, number), _world_key(row.luck, number - number % 2)
@@ -69,7 +69,7 @@ def _draw_worlds(first, count, q, period_s, search_gap, arrays, known):
         own.predicted_mean[:], own.predicted_cov[:] = belief.predicted_mean, belief.predicted_cov
         if state.belief.particles.shape[2] > 0:
             redraw_row(key, 0, state.belief, b)
-        _copy_network(network, state.network, b)
+        _copy_network(known.network, state.network, b)
         state.reports.count[b] = 0
         state.reports.bitmap[b] = bitmap
         state.sensed[b] = bitmap
@@ -101,7 +101,8 @@ def _copy_network(network, copy, b):
 
 def place_nodes(state: State, view: View) -> None:
     """Put the nodes of all rows where the view of one row has them."""
-    for copy, original in zip((state.network.positions, *state.network.grid), (view.positions, *view.network.grid)):
+    state.network.positions[:] = view.positions
+    for (_, copy), (_, original) in zip(state.network.grid.leaves(), view.network.grid.leaves()):
         copy[:] = original
 
 
@@ -115,8 +116,8 @@ class GaussianTracker:
     particles = 0
 
     def __init__(self, scenario: Scenario):
-        if scenario.binary:
-            raise ValueError("particles = 0: must be at least 2 where nodes report one bit")
+        if not scenario.measurement.independent:
+            raise ValueError("particles = 0: must be at least 2 where nodes report a state")
         self._constants = constants(scenario)
 
     def start(self, keys, periods, rows, belief: Belief) -> None:
@@ -132,21 +133,16 @@ class GaussianTracker:
 
 @kernel
 def _correct_rows(cs, beliefs, positions, count, node, value):
-    c = cs[0]
-    r = max(c.noise * c.noise, 1e-12)
+    m = cs[0].measurement
     for b in range(len(beliefs)):
         mean, cov = beliefs[b].mean, beliefs[b].cov
         mean[:], cov[:] = beliefs[b].predicted_mean, beliefs[b].predicted_cov
         for j in range(count[b]):
-            if c.model == POSITION:
-                _correct(mean, cov, 1.0, 0.0, value[b, j, 0] - mean[0], r)
-                _correct(mean, cov, 0.0, 1.0, value[b, j, 1] - mean[2], r)
-            else:
-                dx = mean[0] - positions[b, node[b, j], 0]
-                dy = mean[2] - positions[b, node[b, j], 1]
-                squared = max(dx * dx + dy * dy + 0.5 * (cov[0, 0] + cov[2, 2]), c.floor_m * c.floor_m)
-                slope = strength_slope(squared, c)
-                _correct(mean, cov, slope * dx, slope * dy, value[b, j, 0] - strength(squared, c), r)
+            place = node_at(positions[b], node[b, j])
+            for k in range(len(linearise(m, place, mean[0], mean[2], cov[0, 0], cov[0, 2], cov[2, 2]))):
+                line = linearise(m, place, mean[0], mean[2], cov[0, 0], cov[0, 2], cov[2, 2])[k]
+                innovation = unwrap(m, value[b, j, k], line.expected) - line.expected
+                _correct(mean, cov, line.slope_x, line.slope_y, innovation, max(line.variance, 1e-12))
 
 
 @lean_piece
@@ -166,8 +162,7 @@ def _correct(mean, cov, hx, hy, innovation, r):
 
 
 def rows_of(value, rows):
-    """Some rows of a View or of nested NamedTuples of arrays: a slice, or their numbers."""
+    """Some rows of a View or of a record of arrays: a slice, or their numbers."""
     if isinstance(value, View):
-        parts = value.row, value.belief, value.network, value.reports, value.receivers
-        return View(*(rows_of(part, rows) for part in parts))
-    return type(value)(*(rows_of(part, rows) for part in value)) if isinstance(value, tuple) else value[rows]
+        return View(rows_of(value.knowledge, rows))
+    return value.map(lambda array: array[rows])

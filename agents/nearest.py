@@ -10,11 +10,11 @@ from wsn_env.agents.base import ViewPolicy
 from wsn_env.agents.tuned import tuned
 
 from wsn_env.envs.merit import order_by_merit
-from wsn_env.models.physics.constants import constants
-from wsn_env.models.physics.field import distances_to
 from wsn_env.models.quantity import check_quantity, suggest
+from wsn_env.models.state import Cluster
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.state import Cluster
+from wsn_env.scenario.constants import constants
+from wsn_env.simulation.geometry import distances_to
 from wsn_env.simulation.view import View
 
 ORDERS = ("nearest", "information")
@@ -66,8 +66,7 @@ def surround(view: View, scenario: Scenario, order: str, hysteresis_m, sizes, mo
     else:
         candidates = view.nearest(max(CANDIDATES, most + 1), scenario.ring_m)[0]
         nodes, free = np.empty((len(kept), most + 1), np.int64), np.zeros(len(kept))
-        seen = view.positions, view.receivers, kept, view.belief, free
-        order_by_merit(0, len(kept), constants(scenario), *seen, candidates, nodes)
+        order_by_merit(0, len(kept), constants(scenario), view.knowledge.handle, kept, free, candidates, nodes)
     head = np.where(kept >= 0, kept, nodes[:, 0])
     others = (nodes >= 0) & (nodes != head[:, None])
     members = np.where(others & (np.cumsum(others, axis=1) <= np.reshape(sizes, (-1, 1))), nodes, -1)
@@ -83,7 +82,8 @@ def check_order(order: str) -> None:
 def usual_hysteresis_m(scenario: Scenario) -> float:
     """Where none was tuned [m]. A target that receives itself, or a sink for a beacon's receivers, needs no head:
     nothing is saved by staying."""
-    free = scenario.radio.receiver == "target" or (scenario.hears and scenario.radio.receiver == "sink")
+    receiver = scenario.radio.receiver
+    free = receiver == "target" or (receiver == "sink" and scenario.measurement.lasting_errors)
     return 0.0 if free else RADII * scenario.radius_m
 
 

@@ -23,9 +23,8 @@ from wsn_env.evaluation.policies import Policy, make_policy
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.evaluation.rollout import rollout
 from wsn_env.models.quantity import check_quantity
-from wsn_env.models.sections import Binary, Position
+from wsn_env.models.state import Cluster, State
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.state import Cluster, State
 from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World
 
@@ -65,8 +64,9 @@ class Planner(ViewPolicy):
     order: str | None = None  # of merit; None: nearest for positions and bits, information for strengths
 
     def __post_init__(self):
-        if self.scenario.hears:
-            raise ValueError("Scenario.measurement = Beacon: planner cannot draw a beacon's biases; allowed are others")
+        if self.scenario.measurement.lasting_errors:
+            kind = type(self.scenario.measurement).__name__
+            raise ValueError(f"Scenario.measurement = {kind}: planner cannot draw errors that last; allowed are others")
         check_quantity("Planner", "horizon", self.horizon, at_least=1, whole=True)
         check_quantity("Planner", "worlds", self.worlds, at_least=4, whole=True)
         check_quantity("Planner", "doubt", self.doubt, at_least=0)
@@ -75,8 +75,7 @@ class Planner(ViewPolicy):
 
     @cached_property
     def _order(self) -> str:
-        nearest = isinstance(self.scenario.measurement, (Position, Binary))
-        return self.order or ("nearest" if nearest else "information")
+        return self.order or ("information" if self.scenario.measurement.order == "information" else "nearest")
 
     @cached_property
     def _menu(self) -> MenuAction:
@@ -84,7 +83,7 @@ class Planner(ViewPolicy):
 
     @cached_property
     def _world(self) -> World:
-        usual = PARTICLES if self.scenario.binary else 0
+        usual = PARTICLES if self.scenario.measurement.reports_state else 0
         return imagined_world(self.scenario, self.horizon, usual if self.particles is None else self.particles)
 
     @cached_property

@@ -18,7 +18,7 @@ from wsn_env.agents.base import ViewPolicy
 from wsn_env.envs.interface import Interface, Settings
 from wsn_env.evaluation.files import replacing
 from wsn_env.learning.network import Network
-from wsn_env.simulation.state import Cluster
+from wsn_env.models.state import Cluster
 from wsn_env.simulation.view import View
 
 PRETRAINED = Path(__file__).parent / "pretrained"

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from wsn_env.agents.base import ViewPolicy
 
-from wsn_env.models.physics.sensing import joint_detection_probability
 from wsn_env.models.quantity import check_quantity
-from wsn_env.simulation.state import Cluster
+from wsn_env.models.state import Cluster
+from wsn_env.scenario.sensing import joint_detection_probability
 from wsn_env.simulation.view import View
 
 

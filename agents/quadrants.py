@@ -9,7 +9,7 @@ from wsn_env.agents.base import ViewPolicy
 from wsn_env.agents.strongest import first_of
 
 from wsn_env.models.quantity import check_quantity
-from wsn_env.simulation.state import Cluster
+from wsn_env.models.state import Cluster
 from wsn_env.simulation.view import View
 
 OPPOSITE_FIRST = (0, 2, 1, 3)

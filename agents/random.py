@@ -10,7 +10,7 @@ from wsn_env.agents.strongest import first_of
 
 from wsn_env.compiled.draws import uniforms
 from wsn_env.models.quantity import check_quantity
-from wsn_env.simulation.state import Cluster
+from wsn_env.models.state import Cluster
 from wsn_env.simulation.view import View
 
 

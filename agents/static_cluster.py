@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from wsn_env.agents.base import ViewPolicy
 
-from wsn_env.simulation.state import Cluster
+from wsn_env.models.state import Cluster
 from wsn_env.simulation.view import View
 
 

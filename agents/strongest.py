@@ -8,7 +8,7 @@ import numpy as np
 from wsn_env.agents.base import ViewPolicy
 
 from wsn_env.models.quantity import check_quantity
-from wsn_env.simulation.state import Cluster
+from wsn_env.models.state import Cluster
 from wsn_env.simulation.view import View
 
 
@@ -25,7 +25,7 @@ class Strongest(ViewPolicy):
 
     def act(self, view: View) -> Cluster:
         """Choose, for every row."""
-        level = view.receivers["latest_db"] if self.scenario.hears else -view.distance
+        level = view.receivers["latest_db"] if self.scenario.measurement.lasting_errors else -view.distance
         return first_of(level, view, self.n)
 
 

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from wsn_env.agents.base import ViewPolicy
 
-from wsn_env.models.physics.field import distances_to
 from wsn_env.models.quantity import check_quantity
-from wsn_env.models.sections import Level, Position
-from wsn_env.simulation.state import Cluster
+from wsn_env.models.state import Cluster
+from wsn_env.simulation.geometry import distances_to
 from wsn_env.simulation.view import View
 
 
@@ -37,30 +36,17 @@ class StrongestSignal(ViewPolicy):
 
     def act(self, view: View) -> Cluster:
         """Follow, for every row."""
-        heard = view.detected & view.alive & (view.sees if self.scenario.binary else True)  # a bit of 0 is no signal
-        signal = np.where(heard, self._signal(view), -np.inf)
+        heard = view.detected & view.alive & view.sees  # a state of 0 is no signal
+        signal = np.where(heard, self.scenario.measurement.signals(view.measured, view.positions), -np.inf)
         strongest = signal.argmax(axis=1)
         standing = view.head >= 0
         own = np.where(standing, signal[view.rows, np.maximum(view.head, 0)], -np.inf)
         best = signal[view.rows, strongest]
-        stay = standing & ((best == -np.inf) | (best < self._raised(own)))
+        stay = standing & ((best == -np.inf) | (best < self.scenario.measurement.raised(own, self.hysteresis_db)))
         head = np.where(stay, view.head, np.where(best > -np.inf, strongest, view.nearest_living()))
         centre = view.positions[view.rows, np.maximum(head, 0)]
         members = view.alive & (distances_to(view.positions, centre) <= self._hop_m()) & (head >= 0)[:, None]
         return Cluster.of(head, members)
-
-    def _signal(self, view: View) -> np.ndarray:
-        """(B, S) of the nodes that reported."""
-        if not isinstance(self.scenario.measurement, Position):
-            return view.measured[:, :, 0]
-        offset = view.measured - view.positions
-        return 1.0 / np.maximum((offset * offset).sum(axis=2), 1e-6)
-
-    def _raised(self, signal: np.ndarray) -> np.ndarray:
-        """So much stronger another has to be."""
-        if isinstance(self.scenario.measurement, Level):
-            return signal + self.hysteresis_db
-        return signal * 10 ** (self.hysteresis_db / 10)
 
     def _hop_m(self) -> float:
         if self.hop_m is not None:

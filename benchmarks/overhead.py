@@ -21,7 +21,7 @@ from benchmarks.stopwatch import Stopwatch
 from benchmarks.vector import ID, MENU_ENTRY, ROWS
 from wsn_env.envs.vector_env import ClusterVectorEnv
 from wsn_env.filters.particle import ParticleTracker
-from wsn_env.simulation.state import Belief, Network, Reports
+from wsn_env.models.state import Belief, Network, Reports
 from wsn_env.simulation.view import View
 
 SEED = 0

@@ -79,7 +79,7 @@ def folder_of(asked: Transfer, settings: str) -> Path:
 
 def worlds_of(scenario: Scenario) -> dict[str, str]:
     """{what it is: quantities} that suit a scenario of 225 random nodes on 100 m."""
-    name, sd, unit = ("noise_m", 2.0, "m") if scenario.locates else ("noise_db", 3.0, "dB")
+    name, sd, unit = ("noise_m", 2.0, "m") if scenario.measurement.values == 2 else ("noise_db", 3.0, "dB")
     return {
         "81 nodes on 60 m: the same density": "nodes=81 side_m=60",
         "1,000 on 211 m: the same density": "nodes=1000 side_m=210.8",

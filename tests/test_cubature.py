@@ -8,7 +8,7 @@ from tests.anchors import RING, everyone, play_subsets, ring_scenario, tell
 from wsn_env import Scenario, World
 from wsn_env.filters.cubature import ITERATIONS, TOLERANCE_M, CKFTracker, ICKFTracker
 from wsn_env.filters.kalman import constant_velocity
-from wsn_env.simulation.state import State
+from wsn_env.models.state import State
 
 NODES = np.array(RING, float)
 POSITION = np.eye(4)[::2]

@@ -7,7 +7,7 @@ from rich.console import Console
 from benchmarks import frames, memory, nodes, overhead, recording, training, vector
 from benchmarks.race import Options
 from benchmarks.stopwatch import Stopwatch
-from wsn_env.simulation.state import State
+from wsn_env.models.state import State
 
 GLANCE = Options(rounds=1, short=True)
 QUIET = Console(quiet=True)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from wsn_env import Scenario, ScenarioError, World
 from wsn_env.models.physics.field import index, nearest
-from wsn_env.simulation.state import State
+from wsn_env.models.state import State
 
 
 def network_of(positions, battery=None):

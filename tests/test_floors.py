@@ -9,7 +9,7 @@ ROOT = Path(__file__).parent.parent
 FLOORS = {
     "wsn_env": 0,  # the lazy front door; see the test below
     "wsn_env.compiled.kernels": 0,
-    "wsn_env.simulation.state": 0,
+    "wsn_env.models.state": 0,
     "wsn_env.envs.registration": 0,
     "wsn_env.evaluation.progress": 0,
     "wsn_env.evaluation.files": 0,

@@ -13,7 +13,7 @@ from wsn_env.filters.particle import ParticleTracker
 from wsn_env.models.physics.constants import constants
 from wsn_env.models.physics.motion import predict_moments
 from wsn_env.models.physics.sensing import detection_probability
-from wsn_env.simulation.state import State
+from wsn_env.models.state import State
 
 NODES = np.array([[40.0, 50.0], [55.0, 45.0], [52.0, 60.0], [47.0, 41.0]])
 P0 = np.diag([1.0, 0.01, 1.0, 0.01])

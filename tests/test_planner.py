@@ -14,7 +14,7 @@ from wsn_env.envs.merit import gain
 from wsn_env.models.physics.constants import constants
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.scenario import PRESETS
-from wsn_env.simulation.state import KEEP_CLUSTER
+from wsn_env.models.state import KEEP_CLUSTER
 
 RSSI = Scenario.named("Rssi-v0", particles=200)
 QUICK = dict(horizon=3, worlds=12)

@@ -19,7 +19,7 @@ from wsn_env.compiled import draws
 from wsn_env.evaluation.kept_blocks import BLOCKS_FILE
 from wsn_env.evaluation.policies import named_policies, policy_names
 from wsn_env.models.physics.sensing import detection_probability
-from wsn_env.simulation.state import Cluster
+from wsn_env.models.state import Cluster
 
 SCENARIO = Scenario.named("PreDC-v0", particles=200)
 

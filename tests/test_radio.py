@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wsn_env import Cluster, Scenario, World
-from wsn_env.simulation.state import PURPOSES
+from wsn_env.models.state import PURPOSES
 
 SENSING, HANDOVER, INVITATION, REPORT, BROADCAST, SEARCH = range(6)
 PLACES = ((50, 50), (60, 50), (50, 70), (50, 80))  # 10, 20 and 30 m from node 0

@@ -147,7 +147,7 @@ def run_evaluate(command: Evaluate) -> None:
 
     if command.address and command.engine != "ray":
         raise ValueError(f"--address {command.address}: only with --engine ray")
-    if command.tracks and Scenario.named(command.scenario).hears:
+    if command.tracks and Scenario.named(command.scenario).measurement.lasting_errors:
         run_evaluate_recorded(command)
         return
     scenario = make_scenario(command.scenario, command.set, command.tracks)

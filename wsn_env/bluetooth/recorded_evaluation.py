@@ -25,7 +25,6 @@ from wsn_env.evaluation.rollout import Engine
 from wsn_env.evaluation.versions import versions
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.models.recordings.dataset import DatasetError, read_dataset, track_files, track_name
-from wsn_env.models.sections import Beacon
 from wsn_env.reports.pictures import can_draw, plain, write_picture
 from wsn_env.reports.tables import wide_console
 from wsn_env.scenario import Scenario
@@ -152,7 +151,7 @@ def replay_scenario(scenario: Scenario, path: str | Path, calibrated: bool = Fal
 
 
 def _check_hears(scenario: Scenario) -> None:
-    if not isinstance(scenario.measurement, Beacon):
+    if not scenario.measurement.lasting_errors:
         raise ScenarioError(
             f"scenario = {scenario.name!r}: has no receivers that hear a beacon; recorded tracks are for Ble-v0"
         )

@@ -1,27 +1,27 @@
 """How kernels are compiled: `kernel` for what Python calls, `piece` for what kernels are made of.
 
-`lean_kernel` and `lean_piece` do without Numba's reference counts, an atomic operation for every row of an array taken,
-which cost more than a period's physics. They must allocate nothing: Numba raises "NRT required" where one does.
-
 Strict by construction: no fastmath, no BLAS, no libm; `fast` compiles the same source a second time without that. The
 GIL is released, so that `over_rows` can share a batch among threads; rows never meet, so the number of threads cannot
-change a bit.
+change a bit. With NUMBA_DISABLE_JIT=1 everything runs as plain Python.
+
+`lean_kernel` and `lean_piece` do without Numba's reference counts, an atomic operation for every row of an array taken,
+which cost more than a period's physics. They must allocate nothing: Numba raises "NRT required" where one does. Where
+Numba does not know that option, it counts.
 """
 
+from __future__ import annotations
+
 import functools
-import hashlib
 import os
-import sys
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from types import FunctionType
 
 import numba
 import numpy as np
-from numba.core.caching import FunctionCache, IndexDataCacheFile
-from numba.core.dispatcher import Dispatcher
+from numba.core.options import DefaultOptions
 
-PACKAGE = Path(__file__).parents[1]
+from wsn_env.compiled import store
+
 SERIAL_ROWS = 8  # up to here one thread is faster than handing work out
 
 FAST = {"reassoc", "contract", "arcp", "nsz"}  # not nnan, ninf: infinities and NaN mean what they mean
@@ -33,86 +33,95 @@ FAST_MODULES = (  # the filter; the world stays strict
     "wsn_env.compiled.draws",
 )
 
-# fastmath=False is said aloud: a piece that says nothing takes over what its first caller has.
-piece = numba.njit(error_model="numpy", nogil=True, fastmath=False, _nrt=True)
-inline_piece = numba.njit(error_model="numpy", nogil=True, fastmath=False, _nrt=True, forceinline=True)  # in long loops
-lean_piece = numba.njit(error_model="numpy", nogil=True, fastmath=False, _nrt=False)
-spliced = numba.njit(error_model="numpy", nogil=True, fastmath=False, _nrt=False, inline="always")  # may return arrays
+
+def _options(**wanted) -> dict:
+    """Options of njit; without those that this Numba does not know."""
+    # fastmath=False is said aloud: a piece that says nothing takes over what its first caller has.
+    known = {name: value for name, value in wanted.items() if hasattr(DefaultOptions, name)}
+    return {"nopython": True, "error_model": "numpy", "nogil": True, "fastmath": False} | known
+
+
+_COUNTING, _LEAN = _options(_nrt=True), _options(_nrt=False)
+
+
+def _compile(function, options: dict):
+    return function if numba.config.DISABLE_JIT else numba.jit(**options)(function)
+
+
+def piece(function):
+    """Compile a function for kernels to call."""
+    return _compile(function, _COUNTING)
+
+
+def inline_piece(function):
+    """A piece that is copied into whoever calls it: for long loops."""
+    return _compile(function, _COUNTING | _options(forceinline=True))
+
+
+def lean_piece(function):
+    """A piece that allocates nothing."""
+    return _compile(function, _LEAN)
+
+
+class Kernel:
+    """A compiled function for Python to call, kept on disk; it is made when it is first called."""
+
+    def __init__(self, function: FunctionType, options: dict):
+        functools.update_wrapper(self, function)
+        self.py_func, self.targetoptions = function, options
+        self._call = self._first
+
+    def __call__(self, *arguments):
+        return self._call(*arguments)
+
+    def _first(self, *arguments):
+        if numba.config.DISABLE_JIT:
+            self._call = self.py_func
+            return self._call(*arguments)
+        self._call, result = store.open_kernel(self.py_func, self.targetoptions, arguments)
+        return result
+
+    def __reduce__(self):
+        return self.__qualname__  # of its module: pickled by name, as functions are
 
 
 def kernel(function):
     """Compile a function for Python to call, cached on disk."""
-    return _cached(piece(function))
+    return Kernel(function, _COUNTING)
 
 
 def lean_kernel(function):
     """A kernel of lean pieces only."""
-    return _cached(lean_piece(function))
+    return Kernel(function, _LEAN)
 
 
 @functools.cache
-def fast(dispatcher):
+def fast(compiled):
     """The twin of a kernel or piece whose sums and products the compiler may regroup and fuse.
 
     Its results agree to rounding, but differ from processor to processor. The pieces that the function names get a
     twin of their own, since a function compiled once keeps its rules wherever it is called from; pieces of other than
-    FAST_MODULES stay strict, and so do those named through their module (`draws.stream`). The twin's own name keeps
-    the two apart in the cache.
+    FAST_MODULES stay strict, and so do those named through their module (`draws.stream`).
     """
-    function = dispatcher.py_func
-    seen = {name: function.__globals__.get(name) for name in function.__code__.co_names}
-    pieces = {name: value for name, value in seen.items() if isinstance(value, Dispatcher)}
-    twins = {name: fast(value) for name, value in pieces.items() if value.py_func.__module__ in FAST_MODULES}
+    if numba.config.DISABLE_JIT:
+        return compiled
+    function = compiled.py_func
+    named = {name: function.__globals__.get(name) for name in function.__code__.co_names}
+    twins = {name: fast(value) for name, value in named.items() if _has_twin(value)}
     twin = FunctionType(function.__code__, function.__globals__ | twins, function.__name__, function.__defaults__)
-    twin.__qualname__ = f"{function.__qualname__}_fast"
-    compiled = numba.jit(**dispatcher.targetoptions | {"fastmath": FAST})(twin)
-    return _cached(compiled) if isinstance(dispatcher._cache, _PackageCache) else compiled
+    twin.__qualname__, twin.__module__ = f"{function.__qualname__}_fast", function.__module__
+    options = compiled.targetoptions | {"fastmath": FAST}
+    return Kernel(twin, options) if isinstance(compiled, Kernel) else numba.jit(**options)(twin)
 
 
-def _cached(dispatcher):
-    try:
-        dispatcher._cache = _PackageCache(dispatcher.py_func)
-    except RuntimeError:  # no folder that could be written to: compiled anew in every process
-        pass
-    return dispatcher
-
-
-class _PackageCache(FunctionCache):
-    """Numba's cache, stale as soon as *any* file with kernels changes.
-
-    Numba looks at the kernel's own file only and would serve old code after an edit in a file of its pieces.
-    """
-
-    def __init__(self, function):
-        super().__init__(function)
-        self._cache_file = IndexDataCacheFile(
-            cache_path=self._cache_path,
-            filename_base=self._impl.filename_base,
-            source_stamp=(self._impl.locator.get_source_stamp(), kernels_stamp()),
-        )
-
-    def load_overload(self, sig, target_context):
-        found = super().load_overload(sig, target_context)
-        if found is None:
-            _announce()
-        return found
-
-
-@functools.cache
-def kernels_stamp() -> str:
-    """Digest of every file of the package that has kernels."""
-    texts = (path.read_bytes() for path in sorted(PACKAGE.rglob("*.py")))
-    return hashlib.sha256(b"".join(text for text in texts if b"compiled.kernels" in text)).hexdigest()
-
-
-@functools.cache
-def _announce() -> None:
-    say = "wsn_env: compiling (once on this machine, up to a minute; `wsn compile` does all of it) ..."
-    print(say, file=sys.stderr, flush=True)
+def _has_twin(value) -> bool:
+    function = getattr(value, "py_func", None)
+    return function is not None and not isinstance(value, Kernel) and function.__module__ in FAST_MODULES
 
 
 _pools: dict[int, ThreadPoolExecutor] = {}
-os.register_at_fork(after_in_child=_pools.clear)  # a child has none of its parent's threads
+if hasattr(os, "register_at_fork"):  # not on Windows
+    os.register_at_fork(after_in_child=_pools.clear)  # a child has none of its parent's threads
 
 
 def over_rows(kernel, rows: int, threads: int, *arguments) -> int:

@@ -8,10 +8,10 @@ from gymnasium import spaces
 
 from wsn_env.compiled.kernels import lean_kernel
 from wsn_env.envs.merit import KEEP, NEAREST, ORDERS, fill_chances, rank_row
-from wsn_env.models.physics.constants import constants
 from wsn_env.models.quantity import suggest
+from wsn_env.models.state import KEEP_CLUSTER, Cluster, Sensors, knowledge_at
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.state import KEEP_CLUSTER, Cluster, Sensors
+from wsn_env.scenario.constants import constants
 from wsn_env.simulation.view import View
 
 MENU_MEMBERS = 8  # the menu's largest number of further members
@@ -37,9 +37,9 @@ class MenuAction:
         actions = np.ascontiguousarray(_whole_numbers(action, self.space, rows), np.int64)
         nodes = view.nearest(self._candidates, self._ring_m)[0]
         heads, members = np.empty(rows, np.int64), np.empty((rows, GROUP), np.int32)
-        room = np.empty((3, *nodes.shape)), np.empty(nodes.shape, np.int64)
-        seen = view.network.row, view.positions, view.receivers, view.row, view.belief
-        if _read_menu(0, rows, self._constants, self._by, actions, nodes, *seen, *room, heads, members):
+        scratch = np.empty((3, *nodes.shape)), np.empty(nodes.shape, np.int64)
+        handle = view.knowledge.handle
+        if _read_menu(0, rows, self._constants, self._by, actions, nodes, handle, *scratch, heads, members):
             raise _refusal(action, self.space)
         return Cluster(heads, members)
 
@@ -55,16 +55,15 @@ class MenuAction:
 
 
 @lean_kernel
-def _read_menu(start, stop, cs, by, actions, nodes, standing, positions, receivers, rows, beliefs, *room_and_choice):
+def _read_menu(start, stop, cs, by, actions, nodes, handle, scratch, ordered, heads, members):
     """Fill heads (B,) and members (B, M) from the menu's entries and the candidates (B, K).
 
     Returns: how many actions are not in the menu.
     """
-    room, ordered, heads, members = room_and_choice
-    chances, left, drops = room[0], room[1], room[2]
+    known, chances, left, drops = knowledge_at(handle), scratch[0], scratch[1], scratch[2]
     strange = 0
     for b in range(start, stop):
-        action, head = actions[b], standing[b].head
+        action, head = actions[b], known.network.row[b].head
         strange += action < 0 or action >= MENU_ENTRIES
         members[b] = -1
         if action == 0 and head >= 0:
@@ -73,12 +72,13 @@ def _read_menu(start, stop, cs, by, actions, nodes, standing, positions, receive
         rule, further = (action - 1) // GROUP, (action - 1) % GROUP
         if action <= 0:
             rule, further = KEEP, 0
-        mean, cov, lam = beliefs[b].predicted_mean, beliefs[b].predicted_cov, rows[b].lam
-        sensors = Sensors(positions[b], receivers[b])
+        mean, cov, lam = known.belief[b].predicted_mean, known.belief[b].predicted_cov, known.row[b].lam
+        sensors = Sensors(known.network.positions[b], known.receivers[b])
         if by != NEAREST:
             fill_chances(sensors, nodes[b], mean, cov, cs[0], chances[b])
-        given = head, mean, cov, lam, nodes[b], chances[b], cs[0]
-        heads[b] = rank_row(by, rule, sensors, *given, left[b], ordered[b], drops[b])
+        heads[b] = rank_row(
+            by, rule, sensors, head, mean, cov, lam, nodes[b], chances[b], cs[0], left[b], ordered[b], drops[b]
+        )
         slot = 0
         for node in ordered[b]:
             if further > 0 and node >= 0 and node != heads[b]:

@@ -11,9 +11,9 @@ import numpy as np
 from wsn_env.compiled import draws
 from wsn_env.envs.interface import Interface, Settings
 from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera
+from wsn_env.models.state import OUTCOME, Outcome, State
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.bound import Bound, bound_kind
-from wsn_env.simulation.state import OUTCOME, Outcome, State
 from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World
 

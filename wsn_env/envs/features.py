@@ -4,9 +4,9 @@ import numpy as np
 
 from wsn_env.compiled.elementary import log
 from wsn_env.compiled.kernels import lean_piece
-from wsn_env.envs.merit import chance, gain, place_of
-from wsn_env.models.physics.field import squared_distance
-from wsn_env.simulation.state import Sensors
+from wsn_env.envs.merit import chance_of, gain, place_of
+from wsn_env.models.field import squared_distance
+from wsn_env.models.state import Sensors
 
 BELIEF_FEATURES = (
     "lam",  # log, halved
@@ -47,22 +47,23 @@ NINTH = 9
 
 
 @lean_piece
-def describe_belief(b, rows, beliefs, reported, receivers, network, nodes, distances, c, f):
+def describe_belief(known, b, nodes, distances, c, f):
     """Fill f with BELIEF_FEATURES of row b. Returns the direction of the predicted velocity.
 
     Args:
-        rows, beliefs, reported: (B,) STATE, (B,) BELIEF, reports of the last period.
+        known: what the network knows (Knowledge).
         nodes, distances: (K,) the nearest candidates.
     """
-    m, p, standing = beliefs[b].predicted_mean, beliefs[b].predicted_cov, network.row[b]
+    network, row = known.network, known.row[b]
+    m, p, standing = known.belief[b].predicted_mean, known.belief[b].predicted_cov, network.row[b]
     f[:] = 0.0
-    f[0] = 0.5 * log(max(rows[b].lam, 1e-3))
+    f[0] = 0.5 * log(max(row.lam, 1e-3))
     ex, ey = _describe_ellipse(m, p, c, f)
-    f[9] = 0.2 * rows[b].log_miss
-    f[10] = 0.25 * reported[b]
+    f[9] = 0.2 * row.log_miss
+    f[10] = 0.25 * known.reports.count[b]
     if standing.head >= 0:
         is_nearest, n = standing.head == nodes[0], standing.n_members
-        sensors = Sensors(network.positions[b], receivers[b])
+        sensors = Sensors(network.positions[b], known.receivers[b])
         _describe_head(standing.head, is_nearest, network.members[b], n, sensors, m, p, ex, ey, c, f)
     f[18] = distances[min(NINTH, len(distances)) - 1] / c.radius_m
     return ex, ey
@@ -96,12 +97,12 @@ def _describe_head(head, is_nearest, members, n, sensors, m, p, ex, ey, c, f):
     f[11] = dx * ex + dy * ey
     f[12] = dy * ex - dx * ey
     f[13] = np.sqrt(dx * dx + dy * dy)
-    f[14] = chance(sensors, head, m, p, c)
+    f[14] = chance_of(sensors, head, m, p, c)
     f[15] = 1.0 if is_nearest else 0.0
     f[16] = 0.25 * n
     missed = 1.0 - f[14]
     for k in range(n):
-        missed *= 1.0 - chance(sensors, members[k], m, p, c)
+        missed *= 1.0 - chance_of(sensors, members[k], m, p, c)
     f[17] = 1.0 - missed
 
 

@@ -1,15 +1,22 @@
 """The order in which candidates are worth waking: nearest first, by information, or by information less its price."""
 
 import numpy as np
+from numba.extending import overload
 
-from wsn_env.compiled.elementary import exp, normal_cdf
 from wsn_env.compiled.kernels import kernel, lean_piece
-from wsn_env.models.physics.field import squared_distance
-from wsn_env.models.physics.radio import TO_HEAD, outside, transmission
-from wsn_env.models.physics.sensing import BEACON, BINARY, POSITION, mean_detection, strength_slope
-from wsn_env.simulation.state import Sensors
+from wsn_env.models.field import squared_distance
+from wsn_env.models.measurement.base import (
+    chance,
+    equal_everywhere,
+    informs,
+    linearise,
+    node_of,
+    packets_a_report,
+)
+from wsn_env.models.radio.base import reception, transmission
+from wsn_env.models.state import Sensors, knowledge_at
+from wsn_env.simulation.messages import outside
 
-TWO_PI = 6.283185307179586
 ORDERS = ("nearest", "information", "value")
 NEAREST, INFORMATION, VALUE = range(len(ORDERS))
 KEEP, BEST, AHEAD = range(3)  # who leads
@@ -17,12 +24,10 @@ LEAD = 0.3  # sensing radii
 
 
 @lean_piece
-def chance(sensors, node, mean, cov, c):
-    """Probability that the node detects the target, under the belief; of a receiver, that it hears its beacon."""
-    if c.model == BEACON:
-        return c.heard
-    dx, dy = mean[0] - sensors.positions[node, 0], mean[2] - sensors.positions[node, 1]
-    return mean_detection(dx, dy, cov[0, 0], cov[0, 2], cov[2, 2], c)
+def chance_of(sensors, node, mean, cov, c):
+    """Probability that the node has something to report, under the belief."""
+    place = node_of(sensors, node)
+    return chance(c.measurement, place, mean[0], mean[2], cov[0, 0], cov[0, 2], cov[2, 2], c)
 
 
 @lean_piece
@@ -34,55 +39,49 @@ def gain(detection, sensors, node, mean, cov, p00, p01, p11, c):
 
     Args:
         sensors: the row's Sensors.
-        detection: its `chance` p; of no account for a binary sensor, whose silence tells as much as its report.
+        detection: its `chance_of` p.
         p00, p01, p11: position covariance so far, after the nodes already chosen [m^2].
 
     Returns: gain, and the three entries of the covariance after.
     """
-    r = c.noise * c.noise
-    if c.model == POSITION:
-        s00, s11 = p00 + r, p11 + r
-        share = detection / (s00 * s11 - p01 * p01)
-        c00 = share * (p00 * p00 * s11 - 2.0 * p00 * p01 * p01 + p01 * p01 * s00)
-        c11 = share * (p01 * p01 * s11 - 2.0 * p01 * p01 * p11 + p11 * p11 * s00)
-        c01 = share * (p00 * s11 * p01 - p00 * p01 * p11 - p01 * p01 * p01 + p01 * s00 * p11)
-        return c00 + c11, p00 - c00, p01 - c01, p11 - c11
-    dx = mean[0] - sensors.positions[node, 0]
-    dy = mean[2] - sensors.positions[node, 1]
-    if c.model == BINARY:
-        detection = 1.0
-        h0, h1, r = _edge(dx, dy, cov, c)
-    elif c.model == BEACON:  # the tracker has said what to expect
-        receiver = sensors.receivers[node]
-        h0, h1, r = receiver.gradient[0], receiver.gradient[1], max(receiver.variance, 1e-12)
-    else:
-        # The slope of the strength, smoothed over the belief's own width.
-        squared = max(dx * dx + dy * dy + 0.5 * (cov[0, 0] + cov[2, 2]), c.floor_m * c.floor_m)
-        slope = strength_slope(squared, c)
-        h0, h1 = slope * dx, slope * dy
+    place = node_of(sensors, node)
+    lines = linearise(c.measurement, place, mean[0], mean[2], cov[0, 0], cov[0, 2], cov[2, 2])
+    return drop_by(lines, informs(c.measurement, detection), p00, p01, p11)
+
+
+def drop_by(lines, probability, p00, p01, p11):
+    """`gain` of a report of one linear number, or of two with independent noise, that comes with this probability."""
+    return (_drop_by_one if len(lines) == 1 else _drop_by_two)(lines, probability, p00, p01, p11)
+
+
+@overload(drop_by)
+def _drop_by(lines, probability, p00, p01, p11):
+    chosen = _drop_by_one if len(lines) == 1 else _drop_by_two
+    return lambda lines, probability, p00, p01, p11: chosen(lines, probability, p00, p01, p11)
+
+
+@lean_piece
+def _drop_by_one(lines, probability, p00, p01, p11):
+    h0, h1 = lines[0].slope_x, lines[0].slope_y
     b0, b1 = p00 * h0 + p01 * h1, p01 * h0 + p11 * h1
-    share = detection / (h0 * b0 + h1 * b1 + r)
+    share = probability / (h0 * b0 + h1 * b1 + lines[0].variance)
     return share * (b0 * b0 + b1 * b1), p00 - share * b0 * b0, p01 - share * b0 * b1, p11 - share * b1 * b1
 
 
 @lean_piece
-def _edge(dx, dy, cov, c):
-    """One bit as a linear measurement: its direction, and the noise that leaves the same expected variance.
-
-    A normal x of variance v that is only known to lie on one side of a threshold t sds from its mean keeps, on average,
-    v (1 - phi(t)^2 / (Phi(t) Phi(-t))).
-
-    Args:
-        dx, dy: from the node to the mean [m].
-    """
-    distance = max(np.sqrt(dx * dx + dy * dy), 1e-9)
-    h0, h1 = dx / distance, dy / distance
-    along = max(h0 * h0 * cov[0, 0] + 2.0 * h0 * h1 * cov[0, 2] + h1 * h1 * cov[2, 2], 1e-12)
-    blurred = along + c.edge_m * c.edge_m
-    t = min(abs(c.radius_m - distance) / np.sqrt(blurred), 8.0)
-    below = normal_cdf(-t)
-    told = exp(-t * t) / (TWO_PI * below * (1.0 - below)) * along / blurred
-    return h0, h1, along * (1.0 - told) / max(told, 1e-12)
+def _drop_by_two(lines, probability, p00, p01, p11):
+    """With G = P H' and S = H P H' + R it is p G S^-1 G'."""
+    one, two = lines[0], lines[1]
+    g00, g10 = p00 * one.slope_x + p01 * one.slope_y, p01 * one.slope_x + p11 * one.slope_y
+    g01, g11 = p00 * two.slope_x + p01 * two.slope_y, p01 * two.slope_x + p11 * two.slope_y
+    s00 = one.slope_x * g00 + one.slope_y * g10 + one.variance
+    s01 = one.slope_x * g01 + one.slope_y * g11
+    s11 = two.slope_x * g01 + two.slope_y * g11 + two.variance
+    share = probability / (s00 * s11 - s01 * s01)
+    c00 = share * (g00 * g00 * s11 - 2.0 * g00 * s01 * g01 + g01 * g01 * s00)
+    c11 = share * (g10 * g10 * s11 - 2.0 * g10 * s01 * g11 + g11 * g11 * s00)
+    c01 = share * (g00 * s11 * g10 - g00 * s01 * g11 - g01 * s01 * g10 + g01 * s00 * g11)
+    return c00 + c11, p00 - c00, p01 - c01, p11 - c11
 
 
 @lean_piece
@@ -92,22 +91,23 @@ def price_mj(detection, sensors, node, head, mean, c):
     The report goes to the head, or as far as the prediction where the head is still open; to the sink; to the target.
     """
     x, y = mean[0], mean[2]
-    if c.receiver != TO_HEAD:
+    if not c.radio.to_head:
         x, y = outside(mean, c)
     elif head >= 0:
         x, y = sensors.positions[head, 0], sensors.positions[head, 1]
     squared = squared_distance(sensors.positions, node, x, y)
-    report = c.report_packets * transmission(c.report_bits, squared, c)
-    if c.receiver == TO_HEAD:
-        report += c.report_packets * c.report_bits * c.rx_j_per_bit
-    return 1e3 * (detection * report + c.awake_j - c.asleep_j)
+    packets = packets_a_report(c.measurement)
+    report = packets * transmission(c.radio, c.radio.report_bits, squared)
+    if c.radio.to_head:
+        report += packets * reception(c.radio, c.radio.report_bits)
+    return 1e3 * (detection * report + c.radio.awake_j - c.radio.asleep_j)
 
 
 @lean_piece
 def fill_chances(sensors, nodes, mean, cov, c, chances):
     """chances (K,): of the candidates `nodes`; -1: none."""
     for k in range(len(nodes)):
-        chances[k] = chance(sensors, nodes[k], mean, cov, c) if nodes[k] >= 0 else -1.0
+        chances[k] = chance_of(sensors, nodes[k], mean, cov, c) if nodes[k] >= 0 else -1.0
 
 
 @lean_piece
@@ -121,9 +121,9 @@ def place_of(node, nodes):
 
 @lean_piece
 def known_chance(sensors, node, nodes, chances, mean, cov, c):
-    """`chance` of any node; those of the candidates have been filled in."""
+    """`chance_of` any node; those of the candidates have been filled in."""
     k = place_of(node, nodes)
-    return chances[k] if k >= 0 else chance(sensors, node, mean, cov, c)
+    return chances[k] if k >= 0 else chance_of(sensors, node, mean, cov, c)
 
 
 @lean_piece
@@ -148,8 +148,8 @@ def order_row(sensors, head, mean, cov, lam, nodes, chances, c, left, ordered, d
     drops[:] = 0.0
     for k in range(len(nodes)):
         left[k] = chances[k] if nodes[k] != head else -1.0
-    # Positions tell the same from everywhere: who is most likely to detect tells most.
-    by_chance = c.model == POSITION and lam == 0.0
+    # Where reports tell the same from everywhere, who is most likely to detect tells most.
+    by_chance = equal_everywhere(c.measurement) and lam == 0.0
     for slot in range(len(ordered)):
         best, most, most_drop, after = -1, -np.inf, 0.0, (p00, p01, p11)
         for k in range(len(nodes)):
@@ -218,17 +218,18 @@ def _nearest_ahead(sensors, mean, nodes, c):
 
 
 @kernel
-def order_by_merit(start, stop, cs, positions, receivers, heads, beliefs, lams, nodes, ordered):
-    """`order_row` for every row.
+def order_by_merit(start, stop, cs, handle, heads, lams, nodes, ordered):
+    """`order_row` for every row of what the network knows (Knowledge).
 
     Args:
         heads, lams: (B,).
         nodes: (B, K) candidates, -1: none.
         ordered: (B, M) filled with the first M of them.
     """
+    known = knowledge_at(handle)
     chances, left, drops = np.empty(nodes.shape[1]), np.empty(nodes.shape[1]), np.empty(nodes.shape[1])
     for b in range(start, stop):
-        mean, cov = beliefs[b].predicted_mean, beliefs[b].predicted_cov
-        sensors = Sensors(positions[b], receivers[b])
+        mean, cov = known.belief[b].predicted_mean, known.belief[b].predicted_cov
+        sensors = Sensors(known.network.positions[b], known.receivers[b])
         fill_chances(sensors, nodes[b], mean, cov, cs[0], chances)
         order_row(sensors, heads[b], mean, cov, lams[b], nodes[b], chances, cs[0], left, ordered[b], drops)

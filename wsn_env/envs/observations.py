@@ -18,47 +18,39 @@ from wsn_env.envs.features import (
 )
 from wsn_env.envs.merit import ORDERS, fill_chances, order_row, rank_row
 from wsn_env.envs.prospects import ENTRY_FEATURES, describe_entries, describe_standing, foresee
-from wsn_env.models.physics.constants import constants
-from wsn_env.models.physics.field import find_candidates
 from wsn_env.models.quantity import suggest
+from wsn_env.models.state import Sensors, knowledge_at
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.state import Sensors, network_of
+from wsn_env.scenario.constants import constants
+from wsn_env.simulation.geometry import find_candidates
 from wsn_env.simulation.view import View
 
 G = len(BELIEF_FEATURES)
 
 
 @lean_kernel
-def _encode_candidates(
-    start,
-    stop,
-    cs,
-    battery_j,
-    which,
-    nodes,
-    distances,
-    room,
-    ordered,
-    out,
-    rows,
-    beliefs,
-    reported,
-    receivers,
-    *network,
-):
-    """Fill out (B, n): BELIEF_FEATURES, then CANDIDATE_FEATURES of each candidate; and the candidates (B, K). Only in
-    the rows marked in `which`."""
-    c, network, width = cs[0], network_of(network), len(CANDIDATE_FEATURES)
-    chances, left, drops = room[0], room[1], room[2]
+def _encode_candidates(start, stop, cs, handle, battery_j, rows, whole, real, out):
+    """Fill out (B, n): BELIEF_FEATURES, then CANDIDATE_FEATURES of each candidate. Only in the rows marked.
+
+    Args:
+        handle: of what the network knows (Knowledge).
+        rows: (B,) bool.
+        whole: (2, B, K) filled with the candidates, and with them in order of merit.
+        real: (5, B, K) filled with the candidates' distances [m]; the rest is scratch.
+    """
+    c, known, width = cs[0], knowledge_at(handle), len(CANDIDATE_FEATURES)
+    nodes, ordered = whole[0], whole[1]
+    distances, chances, left, drops = real[0], real[1], real[2], real[3]
     for b in range(start, stop):
-        if not which[b]:
+        if not rows[b]:
             continue
-        m, p, standing = beliefs[b].predicted_mean, beliefs[b].predicted_cov, network.row[b]
+        network = known.network
+        m, p, standing = known.belief[b].predicted_mean, known.belief[b].predicted_cov, network.row[b]
         find_candidates(network, b, m[0], m[2], c.ring_m, nodes[b], distances[b])
         f = out[b]
-        ex, ey = describe_belief(b, rows, beliefs, reported, receivers, network, nodes[b], distances[b], c, f[:G])
+        ex, ey = describe_belief(known, b, nodes[b], distances[b], c, f[:G])
         f[G:] = 0.0
-        sensors, members = Sensors(network.positions[b], receivers[b]), network.members[b]
+        sensors, members = Sensors(network.positions[b], known.receivers[b]), network.members[b]
         fill_chances(sensors, nodes[b], m, p, c, chances[b])
         for k in range(nodes.shape[1]):
             node, g = nodes[b, k], f[G + k * width : G + (k + 1) * width]
@@ -76,47 +68,39 @@ def _encode_candidates(
 
 
 @lean_kernel
-def _encode_menu(
-    start,
-    stop,
-    cs,
-    typical_mj,
-    by,
-    units,
-    which,
-    nodes,
-    distances,
-    room,
-    ordered,
-    out,
-    rows,
-    beliefs,
-    reported,
-    receivers,
-    *network,
-):
-    """Fill out (B, n): BELIEF_FEATURES, then ENTRY_FEATURES of each of the menu's entries; the candidates (B, K).
-    Only in the rows marked in `which`."""
-    c, network, width = cs[0], network_of(network), len(ENTRY_FEATURES)
-    chances, left, drops, later = room[0], room[1], room[2], room[3]
+def _encode_menu(start, stop, cs, handle, terms, rows, whole, real, out):
+    """Fill out (B, n): BELIEF_FEATURES, then ENTRY_FEATURES of each of the menu's entries. Only in the rows marked.
+
+    Args:
+        terms: the scenario's typical energy [mJ], the place in ORDERS, its typical cost in each row (B,) [m].
+        The rest: as `_encode_candidates`.
+    """
+    c, known, width = cs[0], knowledge_at(handle), len(ENTRY_FEATURES)
+    typical_mj, by, costs = terms
+    nodes, ordered = whole[0], whole[1]
+    distances, chances, left, drops, later = real[0], real[1], real[2], real[3], real[4]
     for b in range(start, stop):
-        if not which[b]:
+        if not rows[b]:
             continue
-        m, p, standing = beliefs[b].predicted_mean, beliefs[b].predicted_cov, network.row[b]
-        sensors = Sensors(network.positions[b], receivers[b])
-        members, lam = network.members[b], rows[b].lam
+        network = known.network
+        m, p, standing = known.belief[b].predicted_mean, known.belief[b].predicted_cov, network.row[b]
+        sensors = Sensors(network.positions[b], known.receivers[b])
+        members, lam = network.members[b], known.row[b].lam
         find_candidates(network, b, m[0], m[2], c.ring_m, nodes[b], distances[b])
         f = out[b]
-        way = describe_belief(b, rows, beliefs, reported, receivers, network, nodes[b], distances[b], c, f[:G])
-        known, numbers = (nodes[b], chances[b], later[b]), (lam, units[b], typical_mj)
-        foresee(sensors, known, m, p, c)
-        describe_standing(sensors, standing, members, known, m, p, way, numbers, c, f[G : G + width])
+        way = describe_belief(known, b, nodes[b], distances[b], c, f[:G])
+        candidates, numbers = (nodes[b], chances[b], later[b]), (lam, costs[b], typical_mj)
+        foresee(sensors, candidates, m, p, c)
+        describe_standing(sensors, standing, members, candidates, m, p, way, numbers, c, f[G : G + width])
         for rule in range(3):
-            given = standing.head, m, p, lam, nodes[b], chances[b], c
-            leader = rank_row(by, rule, sensors, *given, left[b], ordered[b], drops[b])
+            leader = rank_row(
+                by, rule, sensors, standing.head, m, p, lam, nodes[b], chances[b], c, left[b], ordered[b], drops[b]
+            )
             first = G + width + rule * GROUP * width
-            given = known, ordered[b], leader, m, p, way, numbers, c
-            describe_entries(sensors, standing, members, *given, width, f[first : first + GROUP * width])
+            entries = f[first : first + GROUP * width]
+            describe_entries(
+                sensors, standing, members, candidates, ordered[b], leader, m, p, way, numbers, c, width, entries
+            )
         clip(f)
 
 
@@ -133,9 +117,10 @@ class CandidatesObservation:
 
     def encode(self, view: View) -> np.ndarray:
         """(B, n) float32, fresh."""
-        rows, candidates = len(view.row), self._candidates
-        view.remember_nearest(np.empty((rows, candidates), np.int64), np.empty((rows, candidates)), self._ring_m)
-        return self._fill(np.empty((rows, *self.space.shape), np.float32), view, np.ones(rows, bool))
+        rows = len(view.row)
+        return self._fill(
+            view, np.ones(rows, bool), np.empty((rows, *self.space.shape), np.float32), self._scratch(view)
+        )
 
     def renew(self, view: View, rows, before: View, last) -> np.ndarray:
         """What `encode` gives, for less where few rows have changed.
@@ -143,17 +128,23 @@ class CandidatesObservation:
         Args:
             rows: (B,) bool, which have changed since `last` was encoded from the view `before`.
         """
-        view.remember_nearest(*(array.copy() for array in before.nearest(self._candidates, self._ring_m)), self._ring_m)
-        return self._fill(last.copy(), view, rows)
+        whole, real = self._scratch(view)
+        whole[0], real[0] = before.nearest(self._candidates, self._ring_m)
+        return self._fill(view, rows, last.copy(), (whole, real))
 
-    def _fill(self, out, view: View, rows):
-        return self._run(_encode_candidates, (self._scenario.radio.battery_j,), out, view, rows)
+    def _scratch(self, view: View) -> tuple[np.ndarray, np.ndarray]:
+        """(2, B, K) and (5, B, K) for the kernels, which leave the candidates and their distances to the view."""
+        shape = len(view.row), self._candidates
+        whole, real = np.empty((2, *shape), np.int64), np.empty((5, *shape))
+        view.remember_nearest(whole[0], real[0], self._ring_m)
+        return whole, real
 
-    def _run(self, kernel, numbers, out, view: View, rows):
-        nodes, distances = view.nearest(self._candidates, self._ring_m)
-        room = rows, nodes, distances, np.empty((4, *nodes.shape)), np.empty(nodes.shape, np.int64), out
-        seen = view.row, view.belief, view.reports.count, view.receivers, *view.network.arrays()
-        over_rows(kernel, len(rows), threads_for(rows, self._threads), self._constants, *numbers, *room, *seen)
+    def _fill(self, view: View, rows, out, scratch) -> np.ndarray:
+        return self._run(_encode_candidates, self._scenario.radio.battery_j, view, rows, out, scratch)
+
+    def _run(self, kernel, terms, view: View, rows, out, scratch) -> np.ndarray:
+        threads = threads_for(rows, self._threads)
+        over_rows(kernel, len(rows), threads, self._constants, view.knowledge.handle, terms, rows, *scratch, out)
         return out
 
 
@@ -168,9 +159,9 @@ class MenuObservation(CandidatesObservation):
         self.space = spaces.Box(-BOUND, BOUND, (G + MENU_ENTRIES * self.shape[1],), np.float32)
         self._order = order
 
-    def _fill(self, out, view: View, rows):
-        numbers = self._scenario.typical_energy_mj, ORDERS.index(self._order), self._scenario.typical_cost(view.lam)
-        return self._run(_encode_menu, numbers, out, view, rows)
+    def _fill(self, view: View, rows, out, scratch) -> np.ndarray:
+        terms = self._scenario.typical_energy_mj, ORDERS.index(self._order), self._scenario.typical_cost(view.lam)
+        return self._run(_encode_menu, terms, view, rows, out, scratch)
 
 
 class DictObservation:
@@ -227,8 +218,8 @@ class ViewObservation:
                 "detected": spaces.Box(0, 1, (nodes,), np.int8),
                 "measured": box(-far, far, nodes, 2),
             }
-            | (self._of_receivers(box, nodes, far) if scenario.hears else {})
-            | ({"bitmap": spaces.Box(0, 1, (nodes,), np.int8)} if scenario.binary else {})
+            | (self._of_receivers(box, nodes, far) if scenario.measurement.lasting_errors else {})
+            | ({"bitmap": spaces.Box(0, 1, (nodes,), np.int8)} if scenario.measurement.reports_state else {})
         )
 
     @staticmethod

@@ -4,10 +4,11 @@ import numpy as np
 
 from wsn_env.compiled.elementary import expected_error, log
 from wsn_env.compiled.kernels import lean_piece
-from wsn_env.envs.merit import chance, fill_chances, gain, known_chance, place_of
-from wsn_env.models.physics.field import squared_distance
-from wsn_env.models.physics.radio import TO_HEAD, outside, transmission
-from wsn_env.models.physics.sensing import BEACON, mean_detection
+from wsn_env.envs.merit import chance_of, fill_chances, gain, known_chance, place_of
+from wsn_env.models.field import squared_distance
+from wsn_env.models.measurement.base import chance, node_of, packets_a_report
+from wsn_env.models.radio.base import reception, transmission
+from wsn_env.simulation.messages import outside
 
 ENTRY_FEATURES = (
     "standing",  # 1: the cluster as it is
@@ -85,7 +86,7 @@ def describe_entries(sensors, standing, members, known, nodes, head, m, p, way, 
                 node = nodes[slot]
                 slot += 1
                 awake = node == old or place_of(node, members[:count]) >= 0
-                called = not awake or (c.receiver == TO_HEAD and head != old)  # a new head calls all of them
+                called = not awake or (c.radio.to_head and head != old)  # a new head calls all of them
                 after, price, sums = _add(sensors, node, head, called, known, m, p, after, sums, c)
                 energy += price
                 invited += called
@@ -104,14 +105,12 @@ def _begin(p):
 @lean_piece
 def _chance_later(sensors, node, m, p, c):
     """Of detecting the target AHEAD periods on, if it keeps its velocity."""
-    if c.model == BEACON:
-        return c.heard
     t = AHEAD * c.period_s
-    dx, dy = m[0] + t * m[1] - sensors.positions[node, 0], m[2] + t * m[3] - sensors.positions[node, 1]
     pxx = p[0, 0] + t * (2.0 * p[0, 1] + t * p[1, 1])
     pxy = p[0, 2] + t * (p[0, 3] + p[1, 2] + t * p[1, 3])
     pyy = p[2, 2] + t * (2.0 * p[2, 3] + t * p[3, 3])
-    return mean_detection(dx, dy, pxx, pxy, pyy, c)
+    place = node_of(sensors, node)
+    return chance(c.measurement, place, m[0] + t * m[1], m[2] + t * m[3], pxx, pxy, pyy, c)
 
 
 @lean_piece
@@ -121,7 +120,7 @@ def _chances(sensors, node, known, m, p, c):
     k = place_of(node, nodes)
     if k >= 0:
         return chances[k], later[k]
-    return chance(sensors, node, m, p, c), _chance_later(sensors, node, m, p, c)
+    return chance_of(sensors, node, m, p, c), _chance_later(sensors, node, m, p, c)
 
 
 @lean_piece
@@ -134,42 +133,44 @@ def _count(sums, detection, arrival, later):
 def _add_head(sensors, head, old, known, m, p, after, sums, c):
     """The head's own report, and the handover to it [mJ]."""
     detection, later = _chances(sensors, head, known, m, p, c)
-    _, p00, p01, p11 = gain(detection * c.head_delivery, sensors, head, m, p, after[0], after[1], after[2], c)
-    joules = c.awake_j - c.asleep_j
-    if c.receiver != TO_HEAD:
+    _, p00, p01, p11 = gain(detection * c.radio.head_delivery, sensors, head, m, p, after[0], after[1], after[2], c)
+    joules = c.radio.awake_j - c.radio.asleep_j
+    if not c.radio.to_head:
         joules += _report_j(sensors, head, head, detection, m, c)
     elif old >= 0 and head != old:
         squared = squared_distance(sensors.positions, old, sensors.positions[head, 0], sensors.positions[head, 1])
-        hops = max(np.ceil(np.sqrt(squared) / c.hop_m), 1.0)
-        joules += hops * (transmission(c.handover_bits, squared, c) + c.handover_bits * c.rx_j_per_bit)
-    return (p00, p01, p11), 1e3 * joules, _count(sums, detection, c.head_delivery, later)
+        hops = max(np.ceil(np.sqrt(squared) / c.radio.hop_m), 1.0)
+        bits = c.radio.handover_bits
+        joules += hops * (transmission(c.radio, bits, squared) + reception(c.radio, bits))
+    return (p00, p01, p11), 1e3 * joules, _count(sums, detection, c.radio.head_delivery, later)
 
 
 @lean_piece
 def _add(sensors, node, head, called, known, m, p, after, sums, c):
     """A member's report, its invitation if it is called, its being awake [mJ]."""
     detection, later = _chances(sensors, node, known, m, p, c)
-    _, p00, p01, p11 = gain(detection * c.delivery, sensors, node, m, p, after[0], after[1], after[2], c)
-    joules = c.awake_j - c.asleep_j + _report_j(sensors, node, head, detection, m, c)
+    _, p00, p01, p11 = gain(detection * c.radio.delivery, sensors, node, m, p, after[0], after[1], after[2], c)
+    joules = c.radio.awake_j - c.radio.asleep_j + _report_j(sensors, node, head, detection, m, c)
     if called:
-        joules += c.invitation_bits * c.rx_j_per_bit
-        if c.receiver == TO_HEAD:
+        joules += reception(c.radio, c.radio.invitation_bits)
+        if c.radio.to_head:
             squared = squared_distance(sensors.positions, node, sensors.positions[head, 0], sensors.positions[head, 1])
-            joules += transmission(c.invitation_bits, squared, c)
-    return (p00, p01, p11), 1e3 * joules, _count(sums, detection, c.delivery, later)
+            joules += transmission(c.radio, c.radio.invitation_bits, squared)
+    return (p00, p01, p11), 1e3 * joules, _count(sums, detection, c.radio.delivery, later)
 
 
 @lean_piece
 def _report_j(sensors, node, head, detection, m, c):
     """Expected energy of a report with its retries [J]."""
-    if c.receiver == TO_HEAD:
-        x, y, hearing = sensors.positions[head, 0], sensors.positions[head, 1], c.report_bits * c.rx_j_per_bit
+    if c.radio.to_head:
+        x, y, hearing = sensors.positions[head, 0], sensors.positions[head, 1], reception(c.radio, c.radio.report_bits)
     else:
         x, y = outside(m, c)
         hearing = 0.0
-    tries = c.delivery / c.packet_success if c.packet_success > 0.0 else float(c.tries)
-    sending = transmission(c.report_bits, squared_distance(sensors.positions, node, x, y), c)
-    return c.report_packets * detection * tries * (sending + hearing)
+    r = c.radio
+    tries = r.delivery / r.packet_success if r.packet_success > 0.0 else float(r.tries)
+    sending = transmission(c.radio, c.radio.report_bits, squared_distance(sensors.positions, node, x, y))
+    return packets_a_report(c.measurement) * detection * tries * (sending + hearing)
 
 
 @lean_piece

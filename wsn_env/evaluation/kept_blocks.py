@@ -8,11 +8,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from wsn_env.compiled.kernels import kernels_stamp
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.policies import Policy
 from wsn_env.evaluation.rollout import Block
-from wsn_env.evaluation.versions import versions
+from wsn_env.evaluation.versions import sources_digest, versions
 
 BLOCKS_FILE = "evaluation.blocks.jsonl"
 
@@ -65,5 +64,5 @@ def _digest(settings: dict, policies: Sequence[Policy]) -> str:
     sources = [getattr(sys.modules.get(type(policy).__module__), "__file__", None) for policy in policies]
     files = [*settings["scenario"]["motion"].get("tracks", ()), *filter(None, sources)]
     contents = [hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in files]
-    known = [settings, versions(), kernels_stamp(), list(map(repr, policies)), contents]
+    known = [settings, versions(), sources_digest(), list(map(repr, policies)), contents]
     return hashlib.sha256(json.dumps(known, sort_keys=True).encode()).hexdigest()

@@ -7,20 +7,18 @@ an object with `act(view) -> Cluster`.
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Sequence
 from importlib.metadata import EntryPoint, entry_points
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Protocol
 
+from wsn_env.models.own import class_in
 from wsn_env.models.quantity import parse_overrides, suggest
+from wsn_env.models.state import Cluster
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.state import Cluster
 from wsn_env.simulation.view import View
 
 GROUP = "wsn_env.policies"
-OF_FILES = "wsn_env_policies_of_file_"  # so begin the names of modules that are files given by path
 
 
 class Policy(Protocol):
@@ -51,7 +49,11 @@ def make_policy(name: str, scenario: Scenario, **parameters) -> Policy:
     file, own, rest = name.partition(".py:")
     plain, colon, text = (rest if own else name).partition(":")
     if own:
-        return _made(name, _class_in(Path(f"{file}.py"), plain), scenario, parameters | _given(colon, text))
+        try:
+            made_by = class_in(Path(f"{file}.py"), plain)
+        except ValueError as problem:
+            raise ValueError(f"policy {problem}") from problem.__cause__
+        return _made(name, made_by, scenario, parameters | _given(colon, text))
     point, number = _entry_point(plain)
     if point is not None:
         try:
@@ -118,23 +120,6 @@ def _made(name: str, made_by, scenario: Scenario, parameters: dict) -> Policy:
     if not callable(getattr(policy, "act", None)):
         raise ValueError(f"policy {name!r}: has no act(view)")
     return policy
-
-
-def _class_in(path: Path, name: str):
-    """A class of a Python file, which is read once."""
-    if not path.is_file():
-        raise ValueError(f"policy {f'{path}:{name}'!r}: there is no file {path}")
-    file = str(path.resolve())
-    module_name = OF_FILES + path.stem
-    module = sys.modules.get(module_name)
-    if module is None or module.__file__ != file:
-        spec = spec_from_file_location(module_name, file)
-        module = sys.modules[module_name] = module_from_spec(spec)
-        spec.loader.exec_module(module)
-    if not hasattr(module, name):
-        known = [each for each, value in vars(module).items() if getattr(value, "__module__", None) == module_name]
-        raise ValueError(f"policy {f'{path}:{name}'!r}: the file has no such class: {suggest(name, known)}")
-    return getattr(module, name)
 
 
 def load_learned(path: Path, scenario: Scenario) -> Policy:

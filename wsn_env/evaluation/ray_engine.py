@@ -6,8 +6,8 @@ import socket
 import sys
 from collections.abc import Iterator, Sequence
 
-from wsn_env.evaluation.policies import OF_FILES
 from wsn_env.evaluation.rollout import Block, Engine, in_this_process
+from wsn_env.models.own import OF_FILES
 
 AHEAD = 4  # tasks a core that wait their turn
 PATIENCE_S = 5.0

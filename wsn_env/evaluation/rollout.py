@@ -9,9 +9,9 @@ import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.evaluation.policies import Policy
+from wsn_env.models.state import Cluster, Outcome, State
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.bound import Bound, bound_kind
-from wsn_env.simulation.state import Cluster, Outcome, State
 from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World
 

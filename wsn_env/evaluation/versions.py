@@ -1,9 +1,13 @@
-"""What made a result: the packages' versions."""
+"""What made a result: the packages' versions, and this package's sources."""
 
 from __future__ import annotations
 
+import hashlib
 import platform
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from importlib.resources import files
+from pathlib import Path
 
 
 def versions() -> dict[str, str]:
@@ -15,3 +19,11 @@ def versions() -> dict[str, str]:
         except PackageNotFoundError:
             pass
     return found
+
+
+@cache
+def sources_digest() -> str:
+    """Of every source file of the package: what it says may have changed with any of them."""
+    folders = [Path(str(files(name))) for name in ("wsn_env", "wsn_env.agents")]
+    paths = sorted({path.resolve() for folder in folders for path in folder.rglob("*.py")})
+    return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).hexdigest()

@@ -2,9 +2,9 @@
 
 from pkgutil import resolve_name
 
+from wsn_env.models.state import Tracker
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.tracking import TRACKERS
-from wsn_env.simulation.state import Tracker
 
 GAUSSIAN = ("ekf", "ukf", "ckf", "ickf", "grnn_kf")  # a mean and a covariance carry what they remember
 

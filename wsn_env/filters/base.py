@@ -1,7 +1,7 @@
 """What trackers without particles share."""
 
+from wsn_env.models.state import Belief, Network, Reports
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.state import Belief, Network, Reports
 
 
 class MomentTracker:

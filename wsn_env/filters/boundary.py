@@ -25,11 +25,11 @@ import numpy as np
 from wsn_env.compiled.kernels import kernel, lean_piece, over_rows
 from wsn_env.filters.base import MomentTracker
 from wsn_env.filters.least_squares import SINGULAR, circle_centre, scalar_update
-from wsn_env.models.physics.constants import constants
-from wsn_env.models.physics.field import squared_distance
+from wsn_env.models.field import squared_distance
+from wsn_env.models.state import Belief, Network, Reports, network_at, reports_at
 from wsn_env.scenario import Scenario
+from wsn_env.scenario.constants import constants
 from wsn_env.scenario.tracking import BOUNDARY_TRACKERS
-from wsn_env.simulation.state import Belief, Network, Reports, network_of
 
 RAW, FED_BACK, MIDPOINT, RANGES, CENTROID, CENTROID_RLS = range(len(BOUNDARY_TRACKERS))
 FEWEST = 4  # boundary nodes that make a fix
@@ -66,26 +66,26 @@ class BoundaryTracker(MomentTracker):
     def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
         """Correct the prediction with the boundary nodes of the period, in place."""
         how = self._constants, self._variant, self._at_rest
-        arrays = belief.row, *reports, *network.arrays()
+        arrays = belief.row, reports.handle, network.handle
         over_rows(correct_rows, len(keys), self._threads, *how, periods, *arrays)
 
 
 @kernel
-def correct_rows(start, stop, cs, variant, at_rest, periods, beliefs, *arrays):
-    """One period of every row; `arrays` are the reports' and the network's."""
-    reports, network = Reports(*arrays[:4]), network_of(arrays[4:])
-    room = np.empty(network.battery.shape[1], np.int32)
+def correct_rows(start, stop, cs, variant, at_rest, periods, beliefs, reports_handle, network_handle):
+    """One period of every row."""
+    reports, network = reports_at(reports_handle), network_at(network_handle)
+    nodes = np.empty(network.battery.shape[1], np.int32)
     for b in range(start, stop):
         belief = beliefs[b]
         take_prediction(belief)
         gate = expect_circle(belief, network, reports.bitmap[b], b, cs[0])
-        n, told = list_boundary(gate, network.positions[b], reports, room, b, cs[0])
+        n, told = list_boundary(gate, network.positions[b], reports, nodes, b, cs[0])
         if variant == RANGES:
-            update_by_ranges(belief, network.positions[b], room[:n], cs[0])
+            update_by_ranges(belief, network.positions[b], nodes[:n], cs[0])
         else:
             restarts = at_rest and periods[b] == 1
             bitmap = reports.bitmap[b]
-            update_by_position(belief, network, bitmap, room[:n], told, gate, restarts, variant, b, cs[0])
+            update_by_position(belief, network, bitmap, nodes[:n], told, gate, restarts, variant, b, cs[0])
 
 
 @lean_piece
@@ -110,14 +110,14 @@ def expect_circle(belief, network, bitmap, b, c):
 
     By the prediction or by the centroid, whichever is sharper: before a filter has learnt a velocity, the centroid.
     """
-    if c.gate_m == np.inf:
+    if c.tracking.gate_m == np.inf:
         return 0.0, 0.0, np.inf
     x, y = middle(belief.predicted_mean, c)
     variance = max(belief.predicted_cov[0, 0], belief.predicted_cov[2, 2])
     cx, cy, spread = centroid(network, bitmap, b, c)
     if 0.0 < spread[0] < variance:
         x, y, variance = cx, cy, spread[0]
-    return x, y, c.gate_m + GATE_SDS * np.sqrt(variance)
+    return x, y, c.tracking.gate_m + GATE_SDS * np.sqrt(variance)
 
 
 @lean_piece

@@ -12,12 +12,11 @@ import numpy as np
 
 from wsn_env.compiled.kernels import kernel, over_rows, piece
 from wsn_env.filters.base import MomentTracker
-from wsn_env.models.physics import sensing
-from wsn_env.models.physics.constants import constants
-from wsn_env.models.physics.field import squared_distance
-from wsn_env.models.physics.motion import predict_moments
+from wsn_env.models.measurement.base import linearise, node_at, unwrap
+from wsn_env.models.motion.prediction import predict_moments
+from wsn_env.models.state import Belief, Network, Reports
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.state import Belief, Network, Reports
+from wsn_env.scenario.constants import constants
 
 ITERATIONS = 5  # at most
 TOLERANCE_M = 1e-3  # a shift of the position below this ends the iteration
@@ -33,7 +32,7 @@ class _CubatureTracker(MomentTracker):
 
     def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
         """Predict and correct every row, in place."""
-        rest = self.iterations, belief.row, network.positions, *reports[:3]
+        rest = self.iterations, belief.row, network.positions, reports.count, reports.node, reports.value
         over_rows(_correct_rows, len(keys), self._threads, self._constants, *rest)
 
 
@@ -58,17 +57,17 @@ def _correct_rows(start, stop, cs, iterations, beliefs, positions, count, node, 
     prior, prior_cov = np.empty(4), np.empty((4, 4))
     for b in range(start, stop):
         mean, cov = beliefs[b].mean, beliefs[b].cov
-        predict_moments(mean, cov, c.period_s, c.q, prior, prior_cov)
+        predict_moments(mean, cov, c.period_s, c.tracking.q, prior, prior_cov)
         mean[:], cov[:] = prior, prior_cov
         heard = count[b]
         if heard == 0:
             continue
-        told = _as_vector(value[b], heard, c)
         for _ in range(iterations):
             x, y = mean[0], mean[2]
-            slope, level, residual = _fit(mean, cov, positions[b], node[b], heard, c)
+            about, told, variance = _expect_about(x, y, positions[b], node[b, :heard], value[b], c)
+            slope, level, residual = _fit(mean, cov, positions[b], node[b, :heard], about, c)
             for i in range(len(told)):  # what is told beyond the fit at the prior
-                residual[i, i] += c.noise * c.noise
+                residual[i, i] += variance[i]
                 level[i] = told[i] - level[i]
                 for k in range(4):
                     level[i] -= slope[i, k] * (prior[k] - mean[k])
@@ -78,25 +77,36 @@ def _correct_rows(start, stop, cs, iterations, beliefs, positions, count, node, 
 
 
 @piece
-def _as_vector(value, heard, c):
-    """The reports (m,): a strength each, or x and y each."""
-    if c.model == sensing.POSITION:
-        return value[:heard].copy().reshape(2 * heard)
-    return value[:heard, 0].copy()
+def _expect_about(x, y, positions, nodes, value, c):
+    """What these nodes are expected to measure of a target at (x, y), what they have measured, told near that, and the
+    variance of the noise: (m,) each, all numbers of a node's value one after the other."""
+    size = 0
+    for node in nodes:
+        size += len(linearise(c.measurement, node_at(positions, node), x, y, 0.0, 0.0, 0.0))
+    about, told, variance = np.empty(size), np.empty(size), np.empty(size)
+    i = 0
+    for j in range(len(nodes)):
+        k = 0
+        for line in linearise(c.measurement, node_at(positions, nodes[j]), x, y, 0.0, 0.0, 0.0):
+            about[i], variance[i] = line.expected, line.variance
+            told[i] = unwrap(c.measurement, value[j, k], line.expected)
+            i, k = i + 1, k + 1
+    return about, told, variance
 
 
 @piece
-def _expect(state, positions, node, heard, c, out):
-    """h(x): what these nodes measure but for noise, as `_as_vector` lays it out."""
-    for i in range(heard):
-        if c.model == sensing.POSITION:
-            out[2 * i], out[2 * i + 1] = state[0], state[2]
-        else:
-            out[i] = sensing.strength(squared_distance(positions, node[i], state[0], state[2]), c)
+def _expect(state, positions, nodes, about, c, out):
+    """h(x): what these nodes measure but for noise, as `_expect_about` lays it out, and told near that."""
+    i = 0
+    for node in nodes:
+        place = node_at(positions, node)
+        for line in linearise(c.measurement, place, state[0], state[2], 0.0, 0.0, 0.0):
+            out[i] = unwrap(c.measurement, line.expected, about[i])
+            i += 1
 
 
 @piece
-def _fit(mean, cov, positions, node, heard, c):
+def _fit(mean, cov, positions, nodes, about, c):
     """Statistical linear regression of h over N(mean, cov), for m measured values.
 
     With L the root of cov, z+_j and z-_j the values at mean +- 2 l_j, and D_j = (z+_j - z-_j) / 4, the covariance of
@@ -104,13 +114,13 @@ def _fit(mean, cov, positions, node, heard, c):
 
     Returns: H (m, 4); the mean value (m,); the residual's covariance (m, m): that of the values less H cov H' = D' D.
     """
-    size = 2 * heard if c.model == sensing.POSITION else heard
+    size = len(about)
     root = cov.copy()
     _factor(root)
     values = np.empty((8, size))
     for j in range(4):
-        _expect(mean + 2.0 * root[:, j], positions, node, heard, c, values[2 * j])
-        _expect(mean - 2.0 * root[:, j], positions, node, heard, c, values[2 * j + 1])
+        _expect(mean + 2.0 * root[:, j], positions, nodes, about, c, values[2 * j])
+        _expect(mean - 2.0 * root[:, j], positions, nodes, about, c, values[2 * j + 1])
     level = np.zeros(size)
     for k in range(8):
         level += values[k] / 8.0

@@ -6,18 +6,17 @@ episode, and nothing of the target enters.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
-from wsn_env.filters.kalman import noise_of
+from wsn_env.filters.linear import LinearModel
 from wsn_env.filters.width import fruit_flies, golden_section
-from wsn_env.models.physics.field import fixed_positions
-from wsn_env.models.physics.sensing import expected_strengths
+from wsn_env.models.field import fixed_positions
 from wsn_env.models.quantity import ScenarioError
-from wsn_env.models.sections import Field, Measurement, Rssi
 from wsn_env.scenario import Scenario
+from wsn_env.scenario.tracking import Tracking
 
 POINTS_A_SIDE = 21  # of the square grid on which the map is made: 10 m apart in a field of 200 m
 SAMPLES = 10  # strengths averaged at a point of the map
@@ -34,12 +33,12 @@ class FingerprintMap:
 
     @classmethod
     def survey(
-        cls, points, nodes, measurement: Measurement, reach_m: float, samples: int, rng: np.random.Generator
+        cls, points, nodes, model: LinearModel, reach_m: float, samples: int, rng: np.random.Generator
     ) -> FingerprintMap:
         """Strengths at (G, 2) points, means of so many noisy samples."""
         offset = points[:, None] - nodes
-        noise = rng.normal(0.0, noise_of(measurement) / samples**0.5, offset.shape[:2])
-        strengths = expected_strengths(points, nodes, measurement) + noise
+        noise = rng.normal(0.0, model.noise / samples**0.5, offset.shape[:2])
+        strengths = model.expected(points, nodes) + noise
         return cls(points, strengths, (offset**2).sum(axis=-1) < reach_m**2)
 
     def distances(self, nodes, values) -> np.ndarray:
@@ -92,22 +91,23 @@ def _weigh(distances, width: float) -> np.ndarray:
 class Training:
     """The map of a scenario, and the random points at which a width is judged; by the training seed alone."""
 
-    def __init__(self, field: Field, measurement: Measurement, reach_m: float, seed: int):
+    def __init__(self, scenario: Scenario):
+        field, reach_m, seed = scenario.field, scenario.reach_m, scenario.tracking.training_seed
+        model = LinearModel(scenario)
         nodes, rng = fixed_positions(field), np.random.default_rng([seed, 0])
         line = np.linspace(0.0, field.side_m, POINTS_A_SIDE)
         grid = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
-        self.map = FingerprintMap.survey(grid, nodes, measurement, reach_m, SAMPLES, rng)
+        self.map = FingerprintMap.survey(grid, nodes, model, reach_m, SAMPLES, rng)
         anywhere = rng.uniform(0.0, field.side_m, (VALIDATION, 2))
-        sample = FingerprintMap.survey(anywhere, nodes, measurement, reach_m, 1, rng)
+        sample = FingerprintMap.survey(anywhere, nodes, model, reach_m, 1, rng)
         heard = [v for v in range(VALIDATION) if sample.audible[v].any()]
         self.points = anywhere[heard]
         self._distances = np.empty((len(heard), len(grid)))
         for row, v in zip(self._distances, heard, strict=True):
             nodes_heard = np.flatnonzero(sample.audible[v])
             row[:] = self.map.distances(nodes_heard, sample.strengths[v, nodes_heard])
-        self._cell_m2, self._noise, self._seed = line[1] ** 2 / 12, noise_of(measurement), seed
-        # Widths are in dB; in power a third of the noise stands for the decibel.
-        self._unit = 1.0 if isinstance(measurement, Rssi) else self._noise / 3
+        self._cell_m2, self._noise, self._seed = line[1] ** 2 / 12, model.noise, seed
+        self._unit = scenario.measurement.fingerprint_unit
 
     def error(self, width: float) -> float:
         """Root mean square error of the fixes at the validation points [m]."""
@@ -155,13 +155,20 @@ def training_of(scenario: Scenario) -> Training:
             f"{name}: a fingerprint map needs nodes that stand in the same places in every episode;"
             " Field.positions or Field.field_seed must be given"
         )
-    training = _training(scenario.field, scenario.measurement, scenario.reach_m, scenario.tracking.training_seed)
+    training = _training(_relevant(scenario))
     if not len(training.points):
         raise ScenarioError(f"{name}: a sensing radius of {scenario.radius_m:g} m: must let nodes hear a target")
     return training
 
 
 _training = lru_cache(maxsize=8)(Training)
+
+
+def _relevant(scenario: Scenario) -> Scenario:
+    """The scenario without what a map does not hang on, so that like ones share theirs."""
+    tracking = replace(Tracking(), tracker=scenario.tracking.tracker, training_seed=scenario.tracking.training_seed)
+    own = dict(field=scenario.field, measurement=scenario.measurement, detection=scenario.detection)
+    return Scenario(name="fingerprints", period_s=3600.0, tracking=tracking, **own)
 
 
 @lru_cache(maxsize=16)

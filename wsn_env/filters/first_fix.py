@@ -1,11 +1,13 @@
 """A Gaussian filter that begins with a fix: `start="fix"`."""
 
+from dataclasses import replace
+
 from wsn_env.filters.grnn import GRNNTracker
 from wsn_env.filters.snapshot import SnapshotTracker
-from wsn_env.models.physics.field import fixed_positions
-from wsn_env.models.sections import Position
+from wsn_env.models.field import fixed_positions
+from wsn_env.models.state import Belief, Network, Reports, Tracker
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.state import Belief, Network, Reports, Tracker
+from wsn_env.scenario.tracking import reads
 
 
 class FirstFix:
@@ -20,7 +22,7 @@ class FirstFix:
     particles = 0
 
     def __init__(self, tracker: Tracker, scenario: Scenario):
-        mapped = not isinstance(scenario.measurement, Position) and fixed_positions(scenario.field) is not None
+        mapped = reads("grnn", scenario.measurement) and fixed_positions(scenario.field) is not None
         self._tracker = tracker
         self._fixer = GRNNTracker(scenario) if mapped else SnapshotTracker(scenario)
         self._whole_m2 = 0.999 * scenario.field.side_m**2 / 12  # of a uniform coordinate, but for rounding
@@ -39,7 +41,7 @@ class FirstFix:
         first = (belief.cov[:, [0, 2], [0, 2]] > self._whole_m2).all(axis=1) & (reports.count > 0)
         self._tracker.correct(keys, periods, belief, network, reports, resampled)
         if first.any():
-            fix = belief._replace(row=belief.row.copy())
+            fix = replace(belief, row=belief.row.copy())
             self._fixer.correct(keys, periods, fix, network, reports, resampled)
             fix.cov[:, [1, 3], [1, 3]] = self._rest_m2s2
             belief.mean[first], belief.cov[first] = fix.mean[first], fix.cov[first]

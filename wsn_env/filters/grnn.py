@@ -3,8 +3,8 @@
 from wsn_env.filters.base import MemorylessTracker, MomentTracker
 from wsn_env.filters.fingerprint import trained_network
 from wsn_env.filters.kalman import POSITION_ROWS, constant_velocity
+from wsn_env.models.state import Belief, Network, Reports
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.state import Belief, Network, Reports
 
 
 class GRNNTracker(MemorylessTracker):

@@ -3,10 +3,9 @@
 import numpy as np
 
 from wsn_env.filters.base import MomentTracker
-from wsn_env.models.physics.sensing import expected_strengths, linearised_strengths
-from wsn_env.models.sections import Level, Measurement, Position
+from wsn_env.filters.linear import LinearModel
+from wsn_env.models.state import Belief, Network, Reports
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.state import Belief, Network, Reports
 
 
 def constant_velocity(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
@@ -20,24 +19,17 @@ def constant_velocity(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     return np.array([[1, t, 0, 0], [0, 1, 0, 0], [0, 0, 1, t], [0, 0, 0, 1.0]]), q * q * gain @ gain.T
 
 
-def noise_of(measurement: Measurement) -> float:
-    """Its sd, in its unit."""
-    if isinstance(measurement, Position):
-        return measurement.noise_m
-    return measurement.noise_db if isinstance(measurement, Level) else measurement.noise
-
-
 class EKFTracker(MomentTracker):
     """filterpy's ExtendedKalmanFilter: each report corrects in turn, in the order of the nodes.
 
-    A position report is linear, so the filter is then exact; a strength is linearised at the current mean. It keeps
+    A linear measurement, such as a position, makes it exact; others are linearised at the current mean. It keeps
     no memory but the belief, and loops over rows: its speed is filterpy's.
     """
 
     def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
         from filterpy.kalman import ExtendedKalmanFilter  # takes a second or two to import
 
-        self._measurement, self._noise = scenario.measurement, noise_of(scenario.measurement)
+        self._model = LinearModel(scenario)
         self._filter = ExtendedKalmanFilter(dim_x=4, dim_z=2)
         self._filter.F, self._filter.Q = constant_velocity(scenario)
 
@@ -52,16 +44,12 @@ class EKFTracker(MomentTracker):
             belief.mean[b], belief.cov[b] = ekf.x, 0.5 * (ekf.P + ekf.P.T)
 
     def _update(self, node: np.ndarray, value: np.ndarray) -> None:
-        variance = self._noise**2
-        if isinstance(self._measurement, Position):
-            self._filter.update(
-                value, HJacobian=lambda x: POSITION_ROWS, Hx=lambda x: x[[0, 2]], R=variance * np.eye(2)
-            )
-            return
-        expected, slope = linearised_strengths(self._filter.x[[0, 2]], node[None], self._measurement)
-        row = np.zeros((1, 4))
-        row[:, [0, 2]] = slope
-        self._filter.update(value[:1], HJacobian=lambda x: row, Hx=lambda x: expected, R=np.array([[variance]]))
+        x, _, y, _ = self._filter.x
+        lines = self._model.lines(x, y, node[None], value[None])
+        rows = np.zeros((self._model.values, 4))
+        rows[:, [0, 2]] = lines.slope[0]
+        noise = np.diag(lines.variance[0])
+        self._filter.update(lines.value[0], HJacobian=lambda x: rows, Hx=lambda x: lines.expected[0], R=noise)
 
 
 class UKFTracker(MomentTracker):
@@ -80,7 +68,7 @@ class UKFTracker(MomentTracker):
             dim_x=4, dim_z=1, dt=scenario.period_s, hx=None, fx=lambda x, dt: transition @ x, points=points
         )
         self._filter.Q = noise
-        self._measurement, self._noise = scenario.measurement, noise_of(scenario.measurement)
+        self._model = LinearModel(scenario)
 
     def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
         """Predict and correct every row, in place."""
@@ -95,12 +83,14 @@ class UKFTracker(MomentTracker):
             belief.mean[b], belief.cov[b] = ukf.x, root.T @ root
 
     def _update(self, nodes: np.ndarray, values: np.ndarray) -> None:
-        m = self._measurement
-        if isinstance(m, Position):
-            told, expect = values.ravel(), lambda x: np.tile(x[[0, 2]], len(nodes))
-        else:
-            told, expect = values[:, 0], lambda x: expected_strengths(x[[0, 2]], nodes, m)
-        self._filter.update(told, R=self._noise**2 * np.eye(len(told)), hx=expect)
+        x, _, y, _ = self._filter.x
+        about = self._model.lines(x, y, nodes, values)
+
+        def expect(state):
+            there = self._model.lines(state[0], state[2], nodes, values)
+            return self._model.near(there.expected, about.expected).ravel()
+
+        self._filter.update(about.value.ravel(), R=np.diag(about.variance.ravel()), hx=expect)
 
 
 def square_root(cov: np.ndarray) -> np.ndarray:

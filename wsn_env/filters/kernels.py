@@ -4,6 +4,8 @@ Structure of arrays in float32: x (4, P) = x, vx, y, vy. Sums run over 16 fixed 
 vector registers of any width and the bits stay the same.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import int32
 
@@ -11,11 +13,12 @@ from wsn_env.compiled import draws
 from wsn_env.compiled.draws import normal_pair32
 from wsn_env.compiled.elementary import F, exp32, f32_bits, f32_from_bits
 from wsn_env.compiled.kernels import kernel, lean_kernel, lean_piece, piece
-from wsn_env.filters.levels import draw_biases, scatter_walkers, walk, weigh_levels
-from wsn_env.filters.likelihood import weigh, weigh_awake, weigh_states
+from wsn_env.filters.likelihood import weigh_awake
 from wsn_env.filters.resampling import REACH, correlated, lower_root, resample, spread_copies
-from wsn_env.models.physics.sensing import BEACON, BINARY
-from wsn_env.simulation.state import Belief, Reports, network_of
+from wsn_env.filters.walkers import scatter_walkers, walk
+from wsn_env.models.measurement.base import weigh_period
+from wsn_env.models.measurement.beacon_levels import draw_biases
+from wsn_env.models.state import belief_at, network_at, reports_at
 
 LANES = 16
 SUMS = 16  # w, w^2, four of w d, ten of w d d'
@@ -140,8 +143,9 @@ def relocate(stream, mean, cov, x):
 
 
 @lean_kernel
-def spread_rows(start, stop, keys, periods, rows, belief):
+def spread_rows(start, stop, keys, periods, rows, belief_handle):
     """Spread the clouds of the rows marked in `rows` about their beliefs' mean and covariance."""
+    belief = belief_at(belief_handle)
     for b in range(start, stop):
         if rows[b]:
             stream = draws.stream(keys[b], periods[b], draws.CLOUD)
@@ -149,65 +153,73 @@ def spread_rows(start, stop, keys, periods, rows, belief):
 
 
 @lean_kernel
-def scatter_rows(start, stop, cs, keys, periods, rows, belief):
+def scatter_rows(start, stop, cs, keys, periods, rows, belief_handle):
     """Scatter walkers all over the room in the rows marked."""
+    belief = belief_at(belief_handle)
     c = cs[0]
     for b in range(start, stop):
         if rows[b]:
             stream = draws.stream(keys[b], periods[b], draws.CLOUD)
-            scatter_walkers(stream, belief.particles[b], belief.log_weights[b], c.velocity_sd, c.side_m, c.depth_m)
+            scatter_walkers(
+                stream, belief.particles[b], belief.log_weights[b], c.tracking.velocity_sd, c.side_m, c.depth_m
+            )
 
 
 @lean_kernel
-def relocate_rows(start, stop, keys, periods, rows, belief):
+def relocate_rows(start, stop, keys, periods, rows, belief_handle):
     """Move the clouds of the rows marked in `rows` to their beliefs' position mean and covariance."""
+    belief = belief_at(belief_handle)
     for b in range(start, stop):
         if rows[b]:
             stream = draws.stream(keys[b], periods[b], draws.RESTART)
             relocate(stream, belief.row[b].mean, belief.row[b].cov, belief.particles[b])
 
 
+class Scratch(NamedTuple):
+    """Memory that `filter_row` needs."""
+
+    weights: np.ndarray  # (P,) float32
+    slots: np.ndarray  # (3, P + REACH) int32
+    states: np.ndarray  # (2, P) complex128
+
+
 @piece
-def filter_row(key, period, belief, network, reports, b, c, maps, room):
+def make_scratch(particles):
+    """For so many particles."""
+    slots = np.empty((3, particles + REACH), np.int32)
+    slots[:, :REACH] = 0  # what `inherit` never writes to
+    return Scratch(np.empty(particles, np.float32), slots, np.empty((2, particles), np.complex128))
+
+
+@piece
+def filter_row(key, period, belief, network, reports, b, c, maps, scratch):
     """One period of row b: `period` counts from 1; the belief is that after the period before.
 
     Args:
-        maps: of `levels.weigh_levels`.
-        room: what `scratch` gives.
+        maps: of the measurement's `residual_maps`.
 
     Returns: whether the particles were resampled.
     """
     x, log_weights, row = belief.particles[b], belief.log_weights[b], belief.row[b]
-    weights, slots, states = room
+    weights, slots, states = scratch.weights, scratch.slots, scratch.states
     n, count = x.shape[1], reports.count[b]
-    if c.walks:
+    if c.tracking.walks:
         walk(draws.stream(key, period, draws.PROCESS), x, c)
     else:
-        predict(draws.stream(key, period, draws.PROCESS), x, c.period_s, c.q)
-    if c.model == BINARY:
-        weigh_states(x, log_weights, network, reports.bitmap[b], reports.node[b, :count], b, c)
-        count = 0
-    elif c.model == BEACON:
-        weigh_levels(x, log_weights, belief, network, reports, b, c, maps, weights)
-        count = 0
-    for j in range(count):
-        position, value = network.positions[b, reports.node[b, j]], reports.value[b, j]
-        if c.pooled:
-            weigh(x, log_weights, j, count, position, value, c)
-        else:  # a constant stride of 1 lets the compiler use vectors
-            weigh(x, log_weights, 0, 1, position, value, c)
-    if c.silent_information:
+        predict(draws.stream(key, period, draws.PROCESS), x, c.period_s, c.tracking.q)
+    weigh_period(c.measurement, x, log_weights, belief, network, reports, b, c, maps, weights)
+    if c.tracking.silent_information:
         weigh_awake(x, log_weights, network, reports.node[b, :count], b, c)
     normalise(log_weights, weights)
     row.n_eff, total = moments(x, weights, row.predicted_mean, row.mean, row.cov)
-    resampled = row.n_eff < c.resample_below * n
+    resampled = row.n_eff < c.tracking.resample_below * n
     if resampled:
         u = draws.uniform(draws.stream(key, period, draws.RESAMPLING), 0)
         resample(u, x, log_weights, weights, total, slots, states)
-        if c.model == BEACON:
-            draw_biases(belief.biases[b], slots[2, REACH:], weights)
-        if c.spread_scale > 0.0:
-            spread_copies(draws.stream(key, period, draws.SPREAD), slots[2, REACH:], c.spread_scale, row.cov, x)
+        draw_biases(belief.biases[b], slots[2, REACH:], weights)
+        if c.tracking.spread_scale > 0.0:
+            spread = draws.stream(key, period, draws.SPREAD)
+            spread_copies(spread, slots[2, REACH:], c.tracking.spread_scale, row.cov, x)
     return resampled
 
 
@@ -223,18 +235,10 @@ def redraw_row(key, period, belief, b):
     belief.log_weights[b, :] = F(0)
 
 
-@piece
-def scratch(particles):
-    """Room that `filter_row` needs: weights, slots and states."""
-    slots = np.empty((3, particles + REACH), np.int32)
-    slots[:, :REACH] = 0  # what `inherit` never writes to
-    return np.empty(particles, np.float32), slots, np.empty((2, particles), np.complex128)
-
-
 @kernel
-def filter_rows(start, stop, constants, maps, keys, periods, resampled, *arrays):
-    """One period of the filter alone; `arrays` are the belief's, the reports' and the network's."""
-    belief, reports, network = Belief(*arrays[:5]), Reports(*arrays[5:9]), network_of(arrays[9:])
-    room = scratch(belief.particles.shape[2])
+def filter_rows(start, stop, cs, maps, keys, periods, resampled, belief_handle, reports_handle, network_handle):
+    """One period of the filter alone."""
+    belief, reports, network = belief_at(belief_handle), reports_at(reports_handle), network_at(network_handle)
+    scratch = make_scratch(belief.particles.shape[2])
     for b in range(start, stop):
-        resampled[b] = filter_row(keys[b], periods[b], belief, network, reports, b, constants[0], maps, room)
+        resampled[b] = filter_row(keys[b], periods[b], belief, network, reports, b, cs[0], maps, scratch)

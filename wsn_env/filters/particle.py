@@ -3,10 +3,9 @@
 from wsn_env.compiled import kernels as compiling
 from wsn_env.compiled.kernels import over_rows, threads_for
 from wsn_env.filters import kernels
-from wsn_env.models.physics.beacon import maps_of
-from wsn_env.models.physics.constants import constants
+from wsn_env.models.state import Belief, Network, Reports
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.state import Belief, Network, Reports
+from wsn_env.scenario.constants import constants
 
 
 class ParticleTracker:
@@ -22,7 +21,7 @@ class ParticleTracker:
         self.threads = threads
         self._filter_rows = compiling.fast(kernels.filter_rows) if fast else kernels.filter_rows
         self._constants = constants(scenario)
-        self.maps = maps_of(scenario)
+        self.maps = scenario.measurement.residual_maps(scenario.field.nodes)
         self._anywhere = scenario.tracking.velocity_s is not None and scenario.tracking.start != "known"
 
     def start(self, keys, periods, rows, belief: Belief) -> None:
@@ -30,17 +29,17 @@ class ParticleTracker:
         over the room."""
         threads = threads_for(rows, self.threads)
         if self._anywhere:
-            over_rows(kernels.scatter_rows, len(keys), threads, self._constants, keys, periods, rows, belief)
+            over_rows(kernels.scatter_rows, len(keys), threads, self._constants, keys, periods, rows, belief.handle)
             return
-        over_rows(kernels.spread_rows, len(keys), threads, keys, periods, rows, belief)
+        over_rows(kernels.spread_rows, len(keys), threads, keys, periods, rows, belief.handle)
 
     def relocate(self, keys, periods, rows, belief: Belief) -> None:
         """Draw the positions of the marked rows' particles from N(mean, cov), in place; keep the velocities."""
         threads = threads_for(rows, self.threads)
-        over_rows(kernels.relocate_rows, len(keys), threads, keys, periods, rows, belief)
+        over_rows(kernels.relocate_rows, len(keys), threads, keys, periods, rows, belief.handle)
 
     def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
         """Predict, weigh, read mean and covariance, resample, in place."""
-        arrays = *belief, *reports, *network.arrays()
-        known = self._constants, self.maps
-        over_rows(self._filter_rows, len(keys), self.threads, *known, keys, periods, resampled, *arrays)
+        handles = belief.handle, reports.handle, network.handle
+        own = self._constants, self.maps
+        over_rows(self._filter_rows, len(keys), self.threads, *own, keys, periods, resampled, *handles)

@@ -4,11 +4,9 @@ import numpy as np
 
 from wsn_env.compiled.kernels import kernel
 from wsn_env.filters.base import MemorylessTracker
-from wsn_env.filters.kalman import noise_of
-from wsn_env.models.physics import sensing
-from wsn_env.models.physics.constants import constants
-from wsn_env.models.sections import Measurement, Rssi
+from wsn_env.models.measurement.base import linearise, node_at
 from wsn_env.scenario import Scenario
+from wsn_env.scenario.constants import constants
 
 ON_A_LINE = 1e-6  # nodes whose squared extents differ by more than this factor fix no point
 FARTHEST = 10  # sides
@@ -24,13 +22,13 @@ class TrilaterationTracker(MemorylessTracker):
 
     def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
         super().__init__(scenario)
-        self._measurement, self._noise = scenario.measurement, noise_of(scenario.measurement)
+        self._measurement = scenario.measurement
         self._constants, self._side_m = constants(scenario), scenario.field.side_m
 
     def locate(self, nodes, places, values):
         """The solution, if there is one."""
         far = FARTHEST * self._side_m
-        found = trilaterate(places, *squared_ranges(values[:, 0], self._measurement, self._noise, far))
+        found = trilaterate(places, *self._measurement.squared_ranges(values[:, 0], far))
         if found is None:
             return None
         point, cov = found
@@ -61,15 +59,15 @@ def _fit_point(cs, nodes, strengths, point, cov):
     for _ in range(NEWTON_STEPS):
         a, b, d, u, v = RIDGE, 0.0, RIDGE, 0.0, 0.0  # the normal equations (a b; b d) step = (u, v)
         for i in range(len(strengths)):
-            dx, dy = point[0] - nodes[i, 0], point[1] - nodes[i, 1]
-            squared = dx * dx + dy * dy
-            beyond = (strengths[i] - sensing.strength(squared, c)) / c.noise
-            slope = sensing.strength_slope(squared, c) / c.noise
-            a += slope * slope * dx * dx
-            b += slope * slope * dx * dy
-            d += slope * slope * dy * dy
-            u += slope * dx * beyond
-            v += slope * dy * beyond
+            place = node_at(nodes, i)
+            line = linearise(c.measurement, place, point[0], point[1], 0.0, 0.0, 0.0)[0]
+            noise = np.sqrt(line.variance)
+            beyond, hx, hy = (strengths[i] - line.expected) / noise, line.slope_x / noise, line.slope_y / noise
+            a += hx * hx
+            b += hx * hy
+            d += hy * hy
+            u += hx * beyond
+            v += hy * beyond
         determinant = max(a * d - b * b, RIDGE * RIDGE)
         cov[0, 0], cov[1, 1] = d / determinant, a / determinant
         cov[0, 1] = cov[1, 0] = -b / determinant
@@ -80,25 +78,6 @@ def _fit_point(cs, nodes, strengths, point, cov):
         point[1] = min(max(point[1] + share * y, -margin), c.side_m + margin)
         if length < NEWTON_END_M:
             break
-
-
-def squared_ranges(strengths, measurement: Measurement, noise: float, most_m: float):
-    """Squared distances that strengths (n,) speak of, by eq. 1 turned round, and their sds to first order [m^2].
-
-    Args:
-        noise: sd of a strength.
-        most_m: a weaker strength, and a power that noise has made negative, is taken to come from this far.
-    """
-    if isinstance(measurement, Rssi):
-        lg = (measurement.reference_dbm - strengths) / (5 * measurement.exponent)
-        squared = 10 ** np.minimum(lg, 2 * np.log10(most_m))
-        relative = noise * np.log(10) / (5 * measurement.exponent)
-    else:
-        power = np.maximum(strengths, measurement.amplitude * most_m**-measurement.exponent)
-        squared = (measurement.amplitude / power) ** (2 / measurement.exponent)
-        relative = 2 * noise / (measurement.exponent * power)
-    squared = np.minimum(squared, most_m**2)
-    return squared, squared * relative
 
 
 def trilaterate(nodes, squared, sd):

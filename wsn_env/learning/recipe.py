@@ -7,12 +7,12 @@ from wsn_env.scenario import Scenario
 
 def suited_order(scenario: Scenario) -> str:
     """The menu's order of merit: by what the nodes measure."""
-    return "value" if scenario.binary else "nearest" if scenario.locates else "information"
+    return scenario.measurement.order
 
 
 def suited_level(scenario: Scenario) -> float:
     """How far advantages are levelled: wholly with positions; with strengths it was tried, and did not help."""
-    return 1.0 if scenario.locates else 0.0
+    return 1.0 if scenario.measurement.order == "nearest" else 0.0
 
 
 def other_densities(scenario: Scenario) -> list[int]:

@@ -16,8 +16,8 @@ import numpy as np
 from wsn_env.evaluation.policies import make_policy
 from wsn_env.evaluation.progress import Progress
 from wsn_env.evaluation.rollout import BLOCK, FIRST_SEED, episodes
+from wsn_env.models.state import PURPOSES
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.state import PURPOSES
 from wsn_env.simulation.world import World
 
 REPORT = PURPOSES.index("report")

@@ -30,7 +30,7 @@ def about_the_bound(evaluation: Evaluation) -> str:
     """What the column of the bound holds, in a sentence."""
     floor = evaluation.floor_m()
     if floor is None:
-        if evaluation.scenario.hears:
+        if evaluation.scenario.measurement.lasting_errors:
             return "no Cramer-Rao bound: the errors of a beacon's levels last over periods"
         return "no Cramer-Rao bound: a bit that jumps at an edge has no Fisher information"
     what = {

@@ -8,32 +8,30 @@ from typing import Any
 
 import numpy as np
 
+from wsn_env.models.detection.base import DetectionRule
+from wsn_env.models.detection.radius import Detection
+from wsn_env.models.detection.threshold import Threshold
+from wsn_env.models.field import Field
+from wsn_env.models.kinds import Kind, Registry
+from wsn_env.models.library import DETECTIONS, MEASUREMENTS, MOTIONS, RADIOS
+from wsn_env.models.measurement.base import Measurement
+from wsn_env.models.measurement.beacon import Beacon
+from wsn_env.models.measurement.binary import Binary
+from wsn_env.models.measurement.position import Position
+from wsn_env.models.measurement.rssi import Rssi
+from wsn_env.models.measurement.sonar import Sonar
+from wsn_env.models.motion.base import Motion
+from wsn_env.models.motion.crossing import Crossing
+from wsn_env.models.motion.cruise import Cruise
+from wsn_env.models.motion.walk import Walk
+from wsn_env.models.own import kind_and_settings
 from wsn_env.models.quantity import NUMBERS, ScenarioError, Section, quantity, suggest
-from wsn_env.models.recordings.replay import periods_of, read_quantities
-from wsn_env.models.sections import (
-    DETECTIONS,
-    MOTIONS,
-    RADIOS,
-    Beacon,
-    Binary,
-    Bluetooth,
-    Crossing,
-    Cruise,
-    Detection,
-    Field,
-    Link,
-    Measurement,
-    Modem,
-    Motion,
-    Position,
-    Radio,
-    Replay,
-    Rssi,
-    Sonar,
-    Threshold,
-    Walk,
-)
-from wsn_env.scenario.tracking import BOUNDARY_TRACKERS, MEASUREMENTS, READS, Tracking
+from wsn_env.models.radio.base import Link
+from wsn_env.models.radio.bluetooth import Bluetooth
+from wsn_env.models.radio.modem import Modem
+from wsn_env.models.radio.radio import Radio
+from wsn_env.models.recordings.replay import read_quantities
+from wsn_env.scenario.tracking import BOUNDARY_TRACKERS, Tracking, reads
 
 RING_OF_EIGHT = tuple((x, y) for y in (0.0, 100.0, 200.0) for x in (0.0, 100.0, 200.0) if (x, y) != (100.0, 100.0))
 
@@ -52,16 +50,21 @@ DONGLES = (  # m, in the order of the dataset's file
     (12.76, 0.27),
 )
 
-KINDS = {
-    "name": (str,),
-    "field": (Field,),
-    "motion": tuple(MOTIONS.values()),
-    "detection": tuple(DETECTIONS.values()),
-    "measurement": tuple(MEASUREMENTS.values()),
-    "radio": tuple(RADIOS.values()),
-    "tracking": (Tracking,),
+PARTS: dict[str, type] = {
+    "name": str,
+    "field": Field,
+    "motion": Motion,
+    "detection": DetectionRule,
+    "measurement": Measurement,
+    "radio": Link,
+    "tracking": Tracking,
 }
-BY_NAME = {"motion": MOTIONS, "detection": DETECTIONS, "measurement": MEASUREMENTS, "radio": RADIOS}
+BY_NAME: dict[str, Registry] = {
+    "motion": MOTIONS,
+    "detection": DETECTIONS,
+    "measurement": MEASUREMENTS,
+    "radio": RADIOS,
+}
 
 
 @dataclass(frozen=True)
@@ -81,51 +84,40 @@ class Scenario(Section):
     reference_energy_mj: float = quantity(0.4, "energy in a period that it must stay below", above=0)
     field: Field = Field()
     motion: Motion = Crossing()
-    detection: Detection | Threshold = Detection()
+    detection: DetectionRule = Detection()
     measurement: Measurement = Position()
     radio: Link = Radio()
     tracking: Tracking = Tracking()
 
     def __post_init__(self):
         super().__post_init__()
-        for name, kinds in KINDS.items():
+        for name, part in PARTS.items():
             value = getattr(self, name)
-            if not isinstance(value, kinds):
-                raise ScenarioError(f"Scenario.{name} = {value!r}: must be a {' or '.join(k.__name__ for k in kinds)}")
+            if not isinstance(value, part):
+                raise ScenarioError(f"Scenario.{name} = {value!r}: must be a {_words(name, part)}")
+            if isinstance(value, Kind):
+                value.check_functions()
         if self.unscored >= self.periods:
             raise ScenarioError(f"Scenario.unscored = {self.unscored}: must be below periods = {self.periods}")
         self._check_tracker()
         low, high = self.lam_range
         if not (np.isfinite([low, high]).all() and 0 <= low <= high) or (low == 0) != (high == 0):
             raise ScenarioError(f"Scenario.lam = {self.lam!r}: must be at least 0 m/mJ, or a pair 0 < low <= high")
-        if isinstance(self.detection, Threshold):
-            self.detection.check(self.measurement)
-        if isinstance(self.measurement, Beacon):
-            self.measurement.of_nodes(self.field.nodes)
-            if self.tracking.search:
-                raise ScenarioError("Tracking.search = True: allowed is False with Beacon levels")
-        elif isinstance(self.motion, Replay):
-            raise ScenarioError(
-                f"Scenario.measurement = {type(self.measurement).__name__}: must be Beacon with the motion 'replay'"
-            )
-        if isinstance(self.radio, Modem) and self.period_s < self.radio.report_s:
-            raise ScenarioError(
-                f"Scenario.period_s = {self.period_s}: must be at least {self.radio.report_s:.3g} s, until a report of"
-                f" {self.radio.report_bits} bits has arrived"
-            )
+        for kind in (self.detection, self.measurement, self.radio):
+            kind.check(self)
 
     def _check_tracker(self) -> None:
         name, kind = self.tracking.tracker, type(self.measurement)
-        if not issubclass(kind, READS[name]):
-            able = [measurement for measurement, its_kind in MEASUREMENTS.items() if its_kind in READS[name]]
+        if not reads(name, self.measurement):
+            able = [known for known, its_kind in MEASUREMENTS.kinds.items() if reads(name, its_kind())]
             allowed = "allowed are the measurements" if len(able) > 1 else "allowed is the measurement"
             raise ScenarioError(
                 f"Tracking.tracker = {name!r}: cannot read {kind.__name__} reports; {allowed} {' and '.join(able)}"
             )
-        if name in BOUNDARY_TRACKERS and not name.startswith("centroid") and self.measurement.reports != "changes":
-            raise ScenarioError(
-                f"Binary.reports = {self.measurement.reports!r}: allowed is 'changes' with the tracker {name!r}"
-            )
+        if name in BOUNDARY_TRACKERS and not name.startswith("centroid"):
+            reports = getattr(self.measurement, "reports", "changes")
+            if reports != "changes":
+                raise ScenarioError(f"Binary.reports = {reports!r}: allowed is 'changes' with the tracker {name!r}")
         needless = {
             "silent_information": name != "particle",
             "resampling": name != "particle",
@@ -139,16 +131,6 @@ class Scenario(Section):
             given = ", ".join(f"Tracking.{item} = {getattr(self.tracking, item)!r}" for item in wrong)
             allowed = ", ".join(repr(usual[item]) for item in wrong)
             raise ScenarioError(f"{given}: allowed is {allowed} with the tracker {name!r}, which makes no use of it")
-        if self.binary and self.tracking.silent_information:
-            raise ScenarioError(
-                "Tracking.silent_information = True: allowed is False with Binary reports, whose bitmap already tells"
-                " who keeps silent"
-            )
-        if self.hears and (self.tracking.silent_information or self.tracking.fusion != "joint"):
-            raise ScenarioError(
-                f"Tracking.silent_information = {self.tracking.silent_information}, Tracking.fusion ="
-                f" {self.tracking.fusion!r}: allowed are False and 'joint' with Beacon levels"
-            )
 
     @property
     def lam_range(self) -> tuple[float, float]:
@@ -184,24 +166,9 @@ class Scenario(Section):
         return tuple(float(f"{self.lam_balance * 2**k / 6:.3g}") for k in range(6))
 
     @property
-    def locates(self) -> bool:
-        """Whether a node reports where the target is, not only how strong its signal."""
-        return isinstance(self.measurement, Position)
-
-    @property
-    def binary(self) -> bool:
-        """Whether nodes report a single bit."""
-        return isinstance(self.measurement, Binary)
-
-    @property
-    def hears(self) -> bool:
-        """Whether nodes report the levels of a beacon's packets."""
-        return isinstance(self.measurement, Beacon)
-
-    @property
     def ring_m(self) -> float:
         """How far from the target a node tells most: at the edge of detection for one bit, as near as may be else."""
-        return self.radius_m if self.binary else 0.0
+        return self.measurement.ring_m(self.radius_m)
 
     @property
     def filter_q(self) -> float:
@@ -258,13 +225,18 @@ class Scenario(Section):
         if changes.get("positions") is not None:
             changes.setdefault("nodes", Field.nodes)  # the positions tell how many
         whole = {}
-        for name, kinds in BY_NAME.items():
+        for name, registry in BY_NAME.items():
             if isinstance(changes.get(name), str):
-                chosen = changes.pop(name)
-                if chosen not in kinds:
-                    raise ScenarioError(f"Scenario.{name} = {chosen!r}: {suggest(chosen, kinds)}")
-                own = {item.name for item in fields(kinds[chosen])}
-                whole[name] = kinds[chosen](**{key: changes.pop(key) for key in own & changes.keys()})
+                kind, settings = kind_and_settings(registry, name, changes.pop(name))
+                own = {item.name for item in fields(kind)}
+                given = {key: changes.pop(key) for key in own & changes.keys()} | settings
+                try:
+                    whole[name] = kind(**given)
+                except TypeError:
+                    strange = next(key for key in given if key not in own)
+                    raise ScenarioError(
+                        f"{kind.__name__} has no quantity {strange!r}: {suggest(strange, own)}"
+                    ) from None
         for item in fields(self):
             if item.name in changes:
                 whole[item.name] = changes.pop(item.name)
@@ -281,9 +253,10 @@ class Scenario(Section):
         if changes:
             name = next(iter(changes))
             raise ScenarioError(f"scenario has no quantity {name!r}: {suggest(name, known)}")
-        motion = whole.get("motion")
-        if isinstance(motion, Replay) and motion != self.motion and "periods" not in whole:
-            whole["periods"] = periods_of(motion.recording, whole.get("period_s", self.period_s))
+        motion = whole.get("motion", self.motion)
+        if motion != self.motion and "periods" not in whole:
+            horizon = motion.horizon(whole.get("period_s", self.period_s))
+            whole |= {} if horizon is None else {"periods": horizon}
         return replace(self, **whole)  # at once: a tracker and what it reads may change together
 
     def quantities(self) -> dict[str, Any]:
@@ -308,6 +281,12 @@ class Scenario(Section):
             else:
                 plain[item.name] = value
         return plain
+
+
+def _words(name: str, part: type) -> str:
+    """What a part of a scenario may be."""
+    kinds = BY_NAME[name].kinds.values() if name in BY_NAME else ()
+    return " or ".join(kind.__name__ for kind in kinds) or part.__name__
 
 
 PRESETS = {

@@ -5,17 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from wsn_env.models.quantity import Section, quantity
-from wsn_env.models.sections.beacon import Beacon
-from wsn_env.models.sections.sensing import Binary, Position, Rssi, RssiPower, Sonar
-
-MEASUREMENTS = {
-    "position": Position,
-    "rssi": Rssi,
-    "rssi_power": RssiPower,
-    "sonar": Sonar,
-    "binary": Binary,
-    "beacon": Beacon,
-}
 
 BOUNDARY_TRACKERS = ("boundary_raw", "boundary", "boundary_mid", "boundary_ekf", "centroid", "centroid_rls")
 TRACKERS = {  # name: where the class stands
@@ -31,13 +20,21 @@ TRACKERS = {  # name: where the class stands
     "grnn_kf": "wsn_env.filters.grnn:GRNNKalmanTracker",
     **dict.fromkeys(BOUNDARY_TRACKERS, "wsn_env.filters.boundary:BoundaryTracker"),
 }
-READS = {  # name: the measurements that it can read
-    **dict.fromkeys(TRACKERS, (Position, Rssi, RssiPower, Sonar)),
-    **dict.fromkeys(("grnn", "grnn_kf"), (Rssi, RssiPower, Sonar)),
-    **dict.fromkeys(("trilateration", "nonlinear_ls"), (Rssi, RssiPower)),
-    **dict.fromkeys(BOUNDARY_TRACKERS, (Binary,)),
-    "particle": tuple(MEASUREMENTS.values()),
-}
+STRENGTHS = ("grnn", "grnn_kf")  # trackers that read values of one number
+RANGES = ("trilateration", "nonlinear_ls")  # that turn a value into a distance
+
+
+def reads(tracker: str, measurement) -> bool:
+    """Whether a tracker can read what a measurement's nodes report."""
+    if tracker == "particle":
+        return True
+    if tracker in BOUNDARY_TRACKERS:
+        return measurement.reports_state
+    if tracker in STRENGTHS:
+        return measurement.independent and hasattr(measurement, "fingerprint_unit")
+    if tracker in RANGES:
+        return measurement.independent and hasattr(measurement, "squared_ranges")
+    return measurement.independent
 
 
 @dataclass(frozen=True)

@@ -15,25 +15,25 @@ Both are made of the truth: for loggers and tables, never for policies.
 
 import numpy as np
 
+from wsn_env.compiled.arrays import record
 from wsn_env.compiled.kernels import lean_kernel, lean_piece, over_rows, threads_for
-from wsn_env.models.physics import sensing
-from wsn_env.models.physics.constants import constants
-from wsn_env.models.physics.field import cells_within, squared_distance
-from wsn_env.models.physics.motion import predict_covariance
-from wsn_env.models.sections import Crossing, Cruise, Threshold
+from wsn_env.models.detection.base import detects, stream_of
+from wsn_env.models.measurement.base import linearise, node_at
+from wsn_env.models.motion.prediction import predict_covariance
+from wsn_env.models.state import Outcome, State, state_at
 from wsn_env.scenario import Scenario
+from wsn_env.scenario.constants import constants
 from wsn_env.simulation.episode import start_record
-from wsn_env.simulation.state import Outcome, State
+from wsn_env.simulation.geometry import cells_within
 
 KINDS = ("bound", "reference", "none")
 MANY_ROWS = 512  # from here on the short work of a period is shared among threads
 
-MEMORY = np.dtype(
+MEMORY = record(
     [
         ("cov", "f8", (4, 4)),  # P after the last period
         ("squares", "f8"),  # sum over the episode's periods of the squared bound [m^2]
-    ],
-    align=True,
+    ]
 )
 
 
@@ -53,18 +53,17 @@ def bound_kind(scenario: Scenario) -> str:
     "none": binary sensors, since a bit that jumps at an edge has no Fisher information; and a beacon's levels, whose
     errors last over periods.
     """
-    if scenario.binary or scenario.hears:
+    if not scenario.measurement.independent:
         return "none"
-    own_noise = isinstance(scenario.motion, (Crossing, Cruise))
-    tells_more = scenario.tracking.silent_information or isinstance(scenario.detection, Threshold)
+    own_noise = scenario.motion.process_noise_ms2 is not None
+    tells_more = scenario.tracking.silent_information or scenario.detection.values_decide
     return "bound" if own_noise and scenario.tracking.start == "known" and not tells_more else "reference"
 
 
 def process_noise(scenario: Scenario) -> float:
     """sd of the target's own white acceleration [m/s^2]; the filter's where the motion has none."""
-    if isinstance(scenario.motion, (Crossing, Cruise)):
-        return scenario.motion.acceleration_ms2
-    return scenario.filter_q
+    own = scenario.motion.process_noise_ms2
+    return scenario.filter_q if own is None else own
 
 
 class Bound:
@@ -87,8 +86,8 @@ class Bound:
         self.kind = bound_kind(scenario)
         self._periods, self._threads = scenario.periods, threads
         self._constants, self._start = constants(scenario), start_record(scenario)
-        self._constants["q"] = process_noise(scenario)
-        if isinstance(scenario.detection, Threshold):
+        self._constants["tracking"]["q"] = process_noise(scenario)
+        if scenario.detection.values_decide:
             self._constants["reach_m"] = np.inf  # noise lifts a level over the threshold from anywhere
         self._asked_first = scenario.tracking.start == "search"
         self._memory = np.zeros(rows, MEMORY)
@@ -104,8 +103,7 @@ class Bound:
         """
         rows = np.ones(len(self._memory), bool) if rows is None else np.asarray(rows, bool)
         bound_m = np.empty(len(rows))
-        told = state.track, state.network.positions, state.reports.count, state.reports.node
-        _begin(0, len(rows), self._constants, self._start, rows, *told, self._memory, bound_m)
+        _begin(0, len(rows), self._constants, self._start, rows, state.handle, self._memory, bound_m)
         return bound_m
 
     def advance(self, state: State, outcome: Outcome) -> np.ndarray:
@@ -119,11 +117,8 @@ class Bound:
         """
         rows = len(self._memory)
         bound_m = np.empty(rows)
-        told = outcome.row, state.network.positions, state.reports.node
-        if rows < MANY_ROWS:
-            _advance(0, rows, self._constants, *told, self._memory, bound_m)
-        else:
-            over_rows(_advance, rows, self._threads, self._constants, *told, self._memory, bound_m)
+        threads = 1 if rows < MANY_ROWS else self._threads
+        over_rows(_advance, rows, threads, self._constants, outcome.row, state.handle, self._memory, bound_m)
         return bound_m
 
     def episode_m(self) -> np.ndarray:
@@ -141,44 +136,48 @@ class Bound:
         """
         rows = np.ones(state.rows, bool) if rows is None else np.asarray(rows, bool)
         floor_m, memory = np.zeros(len(rows)), np.zeros(len(rows), MEMORY)
-        world = state.key, state.track, state.network.positions, state.network.grid
-        arguments = self._constants, self._start, self._asked_first, rows, *world, memory, floor_m
+        arguments = self._constants, self._start, self._asked_first, rows, state.handle, memory, floor_m
         over_rows(_floors, len(rows), threads_for(rows, self._threads), *arguments)
         return floor_m
 
 
 @lean_kernel
-def _begin(start, stop, cs, starts, rows, track, positions, counts, nodes, memory, bound_m):
+def _begin(start, stop, cs, starts, rows, handle, memory, bound_m):
+    state, c = state_at(handle), cs[0]
     for b in range(start, stop):
         own = memory[b]
         if rows[b]:
             _start_anew(own, starts[0])
-            xx, xy, yy = _information_of(counts[b], nodes[b], positions[b], track[b, 0, 0], track[b, 0, 2], cs[0])
+            nodes, truth = state.reports.node[b, : state.reports.count[b]], state.track[b, 0]
+            xx, xy, yy = _information_of(nodes, state.network.positions[b], truth[0], truth[2], c)
             _correct(own.cov, xx, xy, yy)
         bound_m[b] = np.sqrt(own.cov[0, 0] + own.cov[2, 2])
 
 
 @lean_kernel
-def _advance(start, stop, cs, outcomes, positions, nodes, memory, bound_m):
+def _advance(start, stop, cs, outcomes, handle, memory, bound_m):
+    state, c = state_at(handle), cs[0]
     for b in range(start, stop):
         out = outcomes[b]
-        xx, xy, yy = _information_of(out.delivered, nodes[b], positions[b], out.target_m[0], out.target_m[1], cs[0])
-        bound_m[b] = np.sqrt(_take_period(memory[b], xx, xy, yy, cs[0]))
+        nodes = state.reports.node[b, : out.delivered]
+        xx, xy, yy = _information_of(nodes, state.network.positions[b], out.target_m[0], out.target_m[1], c)
+        bound_m[b] = np.sqrt(_take_period(memory[b], xx, xy, yy, c))
 
 
 @lean_kernel
-def _floors(start, stop, cs, starts, asked_first, rows, key, track, positions, grid, memory, floor_m):
+def _floors(start, stop, cs, starts, asked_first, rows, handle, memory, floor_m):
+    state, c = state_at(handle), cs[0]
     for b in range(start, stop):
         if not rows[b]:
             continue
-        own, periods = memory[b], track.shape[1] - 1
+        own, periods = memory[b], state.track.shape[1] - 1
         _start_anew(own, starts[0])
         if asked_first:
-            xx, xy, yy = _information_of_all(key[b], 0, positions[b], grid, b, track[b, 0], cs[0])
+            xx, xy, yy = _information_of_all(state, b, 0, c)
             _correct(own.cov, xx, xy, yy)
         for k in range(1, periods + 1):
-            xx, xy, yy = _information_of_all(key[b], k, positions[b], grid, b, track[b, k], cs[0])
-            _take_period(own, xx, xy, yy, cs[0])
+            xx, xy, yy = _information_of_all(state, b, k, c)
+            _take_period(own, xx, xy, yy, c)
         floor_m[b] = np.sqrt(own.squares / periods)
 
 
@@ -194,7 +193,7 @@ def _start_anew(own, s):
 @lean_piece
 def _take_period(own, xx, xy, yy, c):
     """Predict, correct; returns the trace of the position part."""
-    predict_covariance(own.cov, c.period_s, c.q, own.cov)
+    predict_covariance(own.cov, c.period_s, c.tracking.q, own.cov)
     _correct(own.cov, xx, xy, yy)
     square = own.cov[0, 0] + own.cov[2, 2]
     own.squares += square
@@ -204,37 +203,37 @@ def _take_period(own, xx, xy, yy, c):
 @lean_piece
 def _information(node, positions, x, y, c):
     """H' R^-1 H of one report about the position: its xx, xy and yy [1/m^2]."""
-    weight = 1.0 / (c.noise * c.noise)
-    if c.model == sensing.POSITION:
-        return weight, 0.0, weight
-    dx, dy = x - positions[node, 0], y - positions[node, 1]
-    slope = sensing.strength_slope(dx * dx + dy * dy, c)
-    weight *= slope * slope
-    return weight * dx * dx, weight * dx * dy, weight * dy * dy
+    xx, xy, yy = 0.0, 0.0, 0.0
+    for line in linearise(c.measurement, node_at(positions, node), x, y, 0.0, 0.0, 0.0):
+        weight = 1.0 / line.variance
+        xx += weight * line.slope_x * line.slope_x
+        xy += weight * line.slope_x * line.slope_y
+        yy += weight * line.slope_y * line.slope_y
+    return xx, xy, yy
 
 
 @lean_piece
-def _information_of(count, nodes, positions, x, y, c):
+def _information_of(nodes, positions, x, y, c):
     """Of the period's reports."""
     xx, xy, yy = 0.0, 0.0, 0.0
-    for k in range(count):
-        one = _information(nodes[k], positions, x, y, c)
+    for node in nodes:
+        one = _information(node, positions, x, y, c)
         xx, xy, yy = xx + one[0], xy + one[1], yy + one[2]
     return xx, xy, yy
 
 
 @lean_piece
-def _information_of_all(key, period, positions, grid, b, truth, c):
+def _information_of_all(state, b, period, c):
     """Of every node that would detect the target, if it were awake."""
+    positions, grid, truth = state.network.positions[b], state.network.grid, state.track[b, period]
     x, y, place, starts = truth[0], truth[2], grid.row[b], grid.starts[b]
-    stream = sensing.detection_stream(key, period, c)
+    stream = stream_of(c.detection, state.key[b], period)
     first, last, left, right = cells_within(place, x, y, c.reach_m)
     xx, xy, yy = 0.0, 0.0, 0.0
     for line in range(first, last + 1):
         for slot in range(starts[line * place.side + left], starts[line * place.side + right + 1]):
             node = grid.nodes[b, slot]
-            squared = squared_distance(positions, node, x, y)
-            if sensing.detects_by(stream, node, squared, c):
+            if detects(c.detection, c.measurement, stream, node, node_at(positions, node), x, y):
                 one = _information(node, positions, x, y, c)
                 xx, xy, yy = xx + one[0], xy + one[1], yy + one[2]
     return xx, xy, yy

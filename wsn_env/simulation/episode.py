@@ -3,15 +3,18 @@
 import numpy as np
 
 from wsn_env.compiled import draws
+from wsn_env.compiled.arrays import record
 from wsn_env.compiled.elementary import exp, log
-from wsn_env.compiled.kernels import kernel, piece
-from wsn_env.models.physics.beacon import beacon_record, draw_packets, receivers_of, recorded_packets
-from wsn_env.models.physics.field import index_nodes, lay_out, scatter
-from wsn_env.models.physics.motion import draw_track
-from wsn_env.models.physics.radio import close_books
+from wsn_env.compiled.kernels import kernel, over_rows, piece
+from wsn_env.models.field import lay_out, scatter
+from wsn_env.models.kinds import constants_type, fill_constants
+from wsn_env.models.motion.base import Course, draw, reflect
+from wsn_env.models.state import state_at
 from wsn_env.scenario import Scenario
+from wsn_env.simulation.geometry import index_nodes
+from wsn_env.simulation.messages import clear_ledger
 
-START = np.dtype(
+START = record(
     [
         ("known", "i8"),
         ("sd_m", "f8"),
@@ -23,24 +26,29 @@ START = np.dtype(
         ("field_key", "u8"),
         ("grid", "i8"),
         ("jitter", "f8"),
+        ("side_m", "f8"),
+        ("depth_m", "f8"),
+        ("search_gap", "i8"),
     ]
 )
 
 
 def start_record(scenario: Scenario) -> np.ndarray:
-    """What `begin` needs beside the constants, an array of one: P0, battery, lam, layout, the seed of a fixed field."""
+    """What `begin` needs, an array of one: P0, battery, lam, layout and extent, the seed of a fixed field."""
     known = scenario.tracking.start == "known"
-    record = np.zeros(1, START)
-    record["known"] = known
-    record["sd_m"] = scenario.tracking.start_sd_m if known else scenario.field.side_m / 12**0.5
-    record["sd_ms"] = scenario.tracking.start_sd_ms if known else scenario.tracking.rest_sd_ms
-    record["battery"] = scenario.radio.battery_j
-    record["low"], record["high"] = scenario.lam_range
-    record["grid"], record["jitter"] = scenario.field.layout == "grid", scenario.field.jitter
+    made = np.zeros(1, START)
+    made["known"] = known
+    made["sd_m"] = scenario.tracking.start_sd_m if known else scenario.field.side_m / 12**0.5
+    made["sd_ms"] = scenario.tracking.start_sd_ms if known else scenario.tracking.rest_sd_ms
+    made["battery"] = scenario.radio.battery_j
+    made["side_m"], made["depth_m"] = scenario.field.room_m
+    made["search_gap"] = scenario.tracking.search_gap
+    made["low"], made["high"] = scenario.lam_range
+    made["grid"], made["jitter"] = scenario.field.layout == "grid", scenario.field.jitter
     if scenario.field.field_seed is not None:
-        record["seeded"] = 1
-        record["field_key"] = draws.key_of_seed(scenario.field.field_seed)
-    return record
+        made["seeded"] = 1
+        made["field_key"] = draws.key_of_seed(scenario.field.field_seed)
+    return made
 
 
 def placed_nodes(scenario: Scenario) -> np.ndarray:
@@ -49,26 +57,19 @@ def placed_nodes(scenario: Scenario) -> np.ndarray:
     return np.empty((0, 2)) if positions is None else np.array(positions)
 
 
-def beacon_of(scenario: Scenario) -> tuple[np.ndarray, ...]:
-    """What `begin` needs of a beacon: its record, its receivers (S, 3), recorded packets; empty where there is none."""
-    return beacon_record(scenario), receivers_of(scenario), recorded_packets(scenario)
-
-
 @kernel
-def begin(
-    start, stop, cs, rows, keys, motion, numbers, recordings, starts, placed, beacons, receivers, recorded, state
-):
-    """Field, track, batteries, lam and the first belief of new episodes."""
-    c, s = cs[0], starts[0]
+def begin(start, stop, starts, rows, keys, placed, handle):
+    """Field, batteries, lam and the first belief of new episodes, whose tracks have been drawn."""
+    state, s = state_at(handle), starts[0]
     for b in range(start, stop):
-        close_books(state.ledger, b)
+        clear_ledger(state.ledger, b)
         if not rows[b]:
             continue
         key, row, network, belief = keys[b], state.row[b], state.network, state.belief.row[b]
         state.key[b] = key
         row.period = 0
         row.log_miss = 0.0
-        row.last_search = -c.search_gap
+        row.last_search = -s.search_gap
         row.lam = s.low
         if s.high > s.low:
             row.lam = s.low * exp(log(s.high / s.low) * draws.uniform(draws.stream(key, 0, draws.LAM), 0))
@@ -77,9 +78,9 @@ def begin(
         else:
             field_stream = draws.stream(s.field_key if s.seeded else key, 0, draws.FIELD)
             if s.grid:
-                lay_out(field_stream, c.side_m, s.jitter, network.positions[b])
+                lay_out(field_stream, s.side_m, s.jitter, network.positions[b])
             else:
-                scatter(field_stream, c.side_m, network.positions[b])
+                scatter(field_stream, s.side_m, network.positions[b])
         index_nodes(network.positions[b], network.grid, b)
         network.battery[b] = s.battery
         network.row[b].alive = network.battery.shape[1]
@@ -89,36 +90,45 @@ def begin(
         state.reports.count[b] = 0
         state.reports.bitmap[b] = 0
         belief.n_eff = state.belief.particles.shape[2]
-        track_stream = draws.stream(key, 0, draws.TRACK)
-        draw_track(motion, numbers, recordings, track_stream, c.period_s, c.side_m, c.depth_m, state.track[b])
-        if len(receivers) > 0:
-            if len(recorded) > 0:
-                state.packets[b] = recorded
-            else:
-                at = network.positions[b], receivers, c.period_s, beacons[0]
-                draw_packets(key, state.track[b], *at, state.packets[b])
-            _know_nothing(receivers, c, state.belief.receivers[b], state.belief.biases[b])
-        _first_belief(draws.stream(key, 0, draws.START), state.track[b, 0], s, c, belief.mean, belief.cov)
+        _first_belief(draws.stream(key, 0, draws.START), state.track[b, 0], s, belief.mean, belief.cov)
         belief.predicted_mean[:] = belief.mean  # where a first search takes the target to be
 
 
-@piece
-def _know_nothing(receivers, c, known, biases):
-    for j in range(len(receivers)):
-        known[j].at_1m_db, known[j].slope, known[j].height_m2 = receivers[j, 0], receivers[j, 1], receivers[j, 2]
-        known[j].bias_variance = c.bias_variance
-        known[j].latest_db = 0.0
-    biases[:] = np.float32(0.0)
+class Tracks:
+    """Draws the target's track of an episode."""
+
+    def __init__(self, scenario: Scenario):
+        motion = scenario.motion
+        self._motion = np.zeros(1, constants_type(motion, scenario))
+        fill_constants(self._motion, motion, scenario)
+        side_m, depth_m = scenario.field.room_m
+        self._course = scenario.period_s, side_m, depth_m, motion.recorded_tracks(scenario)
+
+    def draw(self, rows, keys, tracks, threads: int) -> None:
+        """Fill tracks (B, periods + 1, 4) in the rows marked."""
+        over_rows(_draw_tracks, len(rows), threads, self._motion, *self._course, rows, keys, tracks)
+
+
+@kernel
+def _draw_tracks(start, stop, motions, period_s, side_m, depth_m, recorded, rows, keys, tracks):
+    course = Course(period_s, side_m, depth_m, recorded)
+    for b in range(start, stop):
+        if rows[b]:
+            track = tracks[b]
+            draw(motions[0], draws.stream(keys[b], 0, draws.TRACK), course, track)
+            for state in track:
+                reflect(state, 0, side_m)
+                reflect(state, 2, depth_m)
 
 
 @piece
-def _first_belief(stream, truth, s, c, mean, cov):
+def _first_belief(stream, truth, s, mean, cov):
     """start="known": mean ~ N(truth, P0), cov = P0; the other starts: the whole field, at rest."""
     cov[:] = 0.0
     for axis in range(4):
         cov[axis, axis] = s.sd_m**2 if axis % 2 == 0 else s.sd_ms**2
     if not s.known:
-        cov[2, 2] = (s.sd_m * c.depth_m / c.side_m) ** 2
+        cov[2, 2] = (s.sd_m * s.depth_m / s.side_m) ** 2
     if s.known:
         ex, ey = draws.normal_pair(stream, 0)
         evx, evy = draws.normal_pair(stream, 1)
@@ -128,5 +138,5 @@ def _first_belief(stream, truth, s, c, mean, cov):
         mean[3] = truth[3] + s.sd_ms * evy
     else:
         mean[:] = 0.0
-        mean[0] = 0.5 * c.side_m
-        mean[2] = 0.5 * c.depth_m
+        mean[0] = 0.5 * s.side_m
+        mean[2] = 0.5 * s.depth_m

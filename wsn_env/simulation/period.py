@@ -3,58 +3,59 @@
 import numpy as np
 
 from wsn_env.compiled import draws
-from wsn_env.compiled.elementary import expected_error, log
+from wsn_env.compiled.elementary import expected_error
 from wsn_env.compiled.kernels import kernel, lean_kernel, lean_piece
-from wsn_env.filters.kernels import filter_row, redraw_row, scratch
-from wsn_env.filters.levels import foretell
-from wsn_env.models.physics import radio, sensing
-from wsn_env.models.physics.field import nearest_living, squared_distance
-from wsn_env.models.physics.motion import predict_moments, predict_walk
-from wsn_env.simulation.state import KEEP_CLUSTER, KEEP_HEAD, NOBODY, Outcome, state_of
+from wsn_env.filters.kernels import filter_row, make_scratch, redraw_row
+from wsn_env.models.measurement.base import Memory, finds_target, foretell, log_miss, news, node_at, take_note
+from wsn_env.models.motion.prediction import predict_moments, predict_walk
+from wsn_env.models.state import KEEP_CLUSTER, KEEP_HEAD, NOBODY, belief_at, state_at
+from wsn_env.simulation import messages
+from wsn_env.simulation.geometry import nearest_living
 
 
 @kernel
-def run(start, stop, cs, maps, heads, chosen, lost, outcomes, *arrays):
+def run(start, stop, cs, maps, heads, chosen, lost, outcomes, handle):
     """A period with the particle filter at the head, up to where some rows must search; returns how many."""
-    state = state_of(arrays)
-    outcome = Outcome(outcomes, state.ledger.spent_j)
-    room = scratch(state.belief.particles.shape[2])
+    state, c = state_at(handle), cs[0]
+    scratch = make_scratch(state.belief.particles.shape[2])
     count = 0
     for b in range(start, stop):
-        _sense_and_report(heads[b], chosen[b], state, outcome, b, cs[0])
+        out = outcomes[b]
+        _sense_and_report(heads[b], chosen[b], state, out, b, c)
         key, period = state.key[b], state.row[b].period
-        if cs[0].redraw and outcome.row[b].handover:
+        if c.tracking.redraw and out.handover:
             redraw_row(key, period, state.belief, b)
-        resampled = filter_row(key, period, state.belief, state.network, state.reports, b, cs[0], maps, room)
-        lost[b] = _conclude(resampled, state, outcome, b, cs[0])
+        resampled = filter_row(key, period, state.belief, state.network, state.reports, b, c, maps, scratch)
+        lost[b] = _conclude(resampled, state, out, b, c)
         count += lost[b]
-        if cs[0].model == sensing.BEACON:
-            foretell(state.belief, state.network.positions[b], b, cs[0], maps, room[0])
+        foretell(c.measurement, state.belief, state.network.positions[b], b, c, maps, scratch.weights)
     return count
 
 
 @kernel
-def foretell_rows(start, stop, cs, rows, maps, belief, positions):
-    """What the receivers of a beacon should report next, in the rows marked."""
-    room = np.empty(belief.particles.shape[2], np.float32)
+def foretell_rows(start, stop, cs, rows, maps, belief_handle, positions):
+    """What each node should report next, in the rows marked, where the measurement says so."""
+    belief, c = belief_at(belief_handle), cs[0]
+    weights = np.empty(belief.particles.shape[2], np.float32)
     for b in range(start, stop):
         if rows[b]:
-            foretell(belief, positions[b], b, cs[0], maps, room)
+            foretell(c.measurement, belief, positions[b], b, c, maps, weights)
 
 
 @lean_kernel
-def sense_and_report(start, stop, cs, heads, chosen, state, outcome):
+def sense_and_report(start, stop, cs, heads, chosen, outcomes, handle):
     """What comes before the correction, for a tracker that is not compiled."""
+    state = state_at(handle)
     for b in range(start, stop):
-        _sense_and_report(heads[b], chosen[b], state, outcome, b, cs[0])
+        _sense_and_report(heads[b], chosen[b], state, outcomes[b], b, cs[0])
 
 
 @lean_kernel
-def conclude(start, stop, cs, resampled, lost, state, outcome):
+def conclude(start, stop, cs, resampled, lost, outcomes, handle):
     """What comes after it; returns how many rows must search."""
-    count = 0
+    state, count = state_at(handle), 0
     for b in range(start, stop):
-        lost[b] = _conclude(resampled[b], state, outcome, b, cs[0])
+        lost[b] = _conclude(resampled[b], state, outcomes[b], b, cs[0])
         count += lost[b]
     return count
 
@@ -67,14 +68,14 @@ def target_of(state, b):
 
 
 @lean_piece
-def _sense_and_report(head, chosen, state, outcome, b, c):
+def _sense_and_report(head, chosen, state, out, b, c):
     """From the choice to the reports: cluster, target, detections, packets, and what was missed.
 
     A head that dies of what it receives still corrects with what it has heard until then.
     """
     network, reports = state.network, state.reports
-    radio.close_books(state.ledger, b)
-    _take_choice(head, chosen, state, outcome, b, c)  # handover, invitations [J]
+    messages.clear_ledger(state.ledger, b)
+    _take_choice(head, chosen, state, out, b, c)  # handover, invitations [J]
     state.row[b].period += 1
     target = target_of(state, b)  # moves
     reports.count[b] = 0
@@ -86,48 +87,48 @@ def _sense_and_report(head, chosen, state, outcome, b, c):
             place += 1
         for k in range(n + 1):
             node = head if k == place else members[k - (k > place)]
-            if wake(node, radio.SENSING, state, outcome, b, c):
-                sense(node, head, radio.REPORT, target, state, outcome, b, c)
-    if c.asleep_j > 0.0:
-        _sleep(state, outcome, b, c)
+            if wake(node, messages.SENSING, state, out, b, c):
+                sense(node, head, messages.REPORT, target, state, out, b, c)
+    if c.radio.asleep_j > 0.0:
+        _sleep(state, out, b, c)
     _remember_miss(state, b, c)
 
 
 @lean_piece
-def _take_choice(head, chosen, state, outcome, b, c):
+def _take_choice(head, chosen, state, out, b, c):
     """Drop what cannot serve, then form the cluster."""
-    network, out = state.network, outcome.row[b]
+    network = state.network
     standing, battery, predicted = network.row[b], network.battery[b], state.belief.row[b].predicted_mean
     stands = standing.head >= 0 and battery[standing.head] > 0.0
     if head == KEEP_CLUSTER and stands:
         out.members = 1 + standing.n_members
         return
-    if head == NOBODY and c.receiver != radio.TO_HEAD:
+    if head == NOBODY and not c.radio.to_head:
         standing.head = -1
         standing.n_members = 0
         return
-    wanted = 0
+    asked_for = 0
     for node in chosen:
-        wanted += node != -1
+        asked_for += node != -1
     if head < 0 or head >= len(battery) or battery[head] <= 0.0:
         out.dropped += head != KEEP_HEAD and head != KEEP_CLUSTER
         head = standing.head if stands else nearest_living(network.positions[b], battery, predicted[0], predicted[2])
-    wished = state.reports.node[b]  # room for a list: the last period's reports have done their service
-    count = _list_living(chosen, battery, wished)
-    out.dropped += wanted - count
+    others = state.reports.node[b]  # room for a list: the last period's reports have done their service
+    count = _list_living(chosen, battery, others)
+    out.dropped += asked_for - count
     if head < 0:  # nobody is alive
         standing.head = -1
         standing.n_members = 0
         return
     kept = 0
     for k in range(count):
-        if wished[k] != head:
-            if radio.in_one_hop(wished[k], head, network.positions[b], c):
-                wished[kept] = wished[k]
+        if others[k] != head:
+            if messages.in_one_hop(others[k], head, network.positions[b], c):
+                others[kept] = others[k]
                 kept += 1
             else:
                 out.dropped += 1
-    out.handover = radio.form(head, wished, kept, state, outcome, b, c)
+    out.handover = messages.form(head, others, kept, state, out, b, c)
     out.members = 1 + standing.n_members
 
 
@@ -154,13 +155,13 @@ def _list_living(chosen, battery, found):
 
 
 @lean_piece
-def wake(node, purpose, state, outcome, b, c):
+def wake(node, purpose, state, out, b, c):
     """A node pays for being awake in this period. Returns whether it could."""
-    return state.network.battery[b, node] > 0.0 and radio.spend(node, c.awake_j, purpose, state, outcome, b)
+    return state.network.battery[b, node] > 0.0 and messages.spend(node, c.radio.awake_j, purpose, state, out, b)
 
 
 @lean_piece
-def _sleep(state, outcome, b, c):
+def _sleep(state, out, b, c):
     """All living nodes outside the cluster pay for the period, too."""
     network, standing = state.network, state.network.row[b]
     battery, members, j = network.battery[b], network.members[b], 0
@@ -169,115 +170,64 @@ def _sleep(state, outcome, b, c):
             j += 1
         awake = node == standing.head or (j < standing.n_members and members[j] == node)
         if not awake and battery[node] > 0.0:
-            radio.spend(node, c.asleep_j, radio.SENSING, state, outcome, b)
+            messages.spend(node, c.radio.asleep_j, messages.SENSING, state, out, b)
 
 
 @lean_piece
-def sense(node, head, purpose, target, state, outcome, b, c):
-    """An awake node's period: detect, measure, report."""
-    positions, battery, reports = state.network.positions[b], state.network.battery[b], state.reports
-    key, period = state.key[b], state.row[b].period
-    if battery[node] <= 0.0:
+def sense(node, head, purpose, target, state, out, b, c):
+    """An awake node's period: it reports what it has to tell, if anything."""
+    if state.network.battery[b, node] <= 0.0:
         return
-    if c.model == sensing.BEACON:
-        _pass_on(node, head, purpose, state, outcome, b, c)
-        return
-    squared = squared_distance(positions, node, target[0], target[1])
-    value = sensing.tells(key, period, node, squared, c)
-    has_news, changed = value, False
-    if c.model == sensing.BINARY:
-        has_news, changed = _update_state(node, value, purpose, state, b, c)
+    memory, reports = memory_of(state, b), state.reports
+    place = node_at(state.network.positions[b], node)
+    asked = purpose == messages.SEARCH
+    has_news, value, second, packets = news(
+        c.measurement, memory, state.key[b], state.row[b].period, node, place, target[0], target[1], asked, c
+    )
     if not has_news:
         return
-    outcome.row[b].detections += 1
-    if radio.report(node, head, 1.0, purpose, state, outcome, b, c):
+    out.detections += 1
+    if messages.report(node, head, packets, purpose, state, out, b, c):
         slot = reports.count[b]
         reports.node[b, slot] = node
-        if c.model == sensing.BINARY:
-            reports.value[b, slot, 0] = value
-            reports.value[b, slot, 1] = changed
-            reports.bitmap[b, node] = value
-        else:
-            sensing.measure(key, period, node, positions, target, c, reports.value[b, slot])
+        reports.value[b, slot, 0] = value
+        reports.value[b, slot, 1] = second
         reports.count[b] += 1
+        take_note(c.measurement, memory, node, value)
 
 
 @lean_piece
-def _pass_on(node, head, purpose, state, outcome, b, c):
-    """A receiver's period: it reports the packets that it has heard."""
-    reports, heard = state.reports, state.packets[b, min(state.row[b].period, state.packets.shape[1] - 1), node]
-    if heard[1] > 0.0:
-        outcome.row[b].detections += 1
-        if radio.report(node, head, np.float64(heard[1]), purpose, state, outcome, b, c):
-            slot = reports.count[b]
-            reports.node[b, slot] = node
-            reports.value[b, slot, 0] = heard[0]
-            reports.value[b, slot, 1] = heard[1]
-            reports.count[b] += 1
-
-
-@lean_piece
-def _update_state(node, value, purpose, state, b, c):
-    """A binary sensor compares what it senses with what it sensed last. Returns whether it has to report, and
-    whether its state has changed.
-
-    In a search everybody is asked, and silence means 0; so it does where every presence is reported.
-    """
-    changed = value != (state.sensed[b, node] != 0)
-    state.sensed[b, node] = value
-    if c.every_presence or purpose == radio.SEARCH:
-        state.reports.bitmap[b, node] = 0
-        return value, changed
-    return changed or (c.refresh > 0 and state.row[b].period % c.refresh == 0), changed
+def memory_of(state, b):
+    """What a row's nodes and their head keep of states and packets."""
+    instant = min(state.row[b].period, state.packets.shape[1] - 1)
+    return Memory(state.sensed[b], state.reports.bitmap[b], state.packets[b, instant])
 
 
 @lean_piece
 def _remember_miss(state, b, c):
     """How improbable the silence since the last report is, seen from the belief."""
-    if _hears_of_target(state, b, c):
+    network, belief = state.network, state.belief.row[b]
+    standing, members, count = network.row[b], network.members[b], network.row[b].n_members
+    if finds_target(c.measurement, memory_of(state, b), state.reports.count[b], standing.head, members, count):
         state.row[b].log_miss = 0.0
-    elif c.model == sensing.BEACON:  # a receiver hears it anywhere
-        standing = state.network.row[b]
-        awake = standing.n_members + (standing.head >= 0)
-        state.row[b].log_miss += awake * log(max(1.0 - c.heard, 1e-12))
     else:
-        network, belief = state.network, state.belief.row[b]
-        standing = network.row[b]
-        state.row[b].log_miss += sensing.log_miss_probability(
-            belief.predicted_mean,
-            belief.predicted_cov,
-            network.positions[b],
-            network.members[b],
-            standing.n_members,
-            standing.head,
-            c,
+        mean, cov = belief.predicted_mean, belief.predicted_cov
+        state.row[b].log_miss += log_miss(
+            c.measurement, mean, cov, network.positions[b], standing.head, members, count, c
         )
 
 
 @lean_piece
-def _hears_of_target(state, b, c):
-    """Whether a report came in; of binary sensors, whose state often stays, whether any that is awake is known to
-    detect."""
-    if c.model != sensing.BINARY:
-        return state.reports.count[b] > 0
-    standing, members, bitmap = state.network.row[b], state.network.members[b], state.reports.bitmap[b]
-    found = standing.head >= 0 and bitmap[standing.head] != 0
-    for k in range(standing.n_members):
-        found |= bitmap[members[k]] != 0
-    return found
-
-
-@lean_piece
-def _conclude(resampled, state, outcome, b, c):
+def _conclude(resampled, state, out, b, c):
     """After the correction: the broadcast, and the end of the period unless a search must come first; returns
     whether it must."""
     if resampled and state.network.row[b].head >= 0:
-        outcome.row[b].resampled = True
-        if c.receiver == radio.TO_HEAD:
-            radio.broadcast(state, outcome, b, c)
+        out.resampled = True
+        if c.radio.to_head:
+            messages.broadcast(state, out, b, c)
     lost = _is_lost(state, b, c)
     if not lost:
-        _settle(state, outcome, b, c)
+        _settle(state, out, b, c)
     return lost
 
 
@@ -286,25 +236,26 @@ def _is_lost(state, b, c):
     """The search rule: too long a silence, or a belief wider than a node's radius; not twice within the gap."""
     cov, row = state.belief.row[b].cov, state.row[b]
     wide = max(cov[0, 0], cov[2, 2]) > c.radius_m * c.radius_m
-    rested = row.period - row.last_search >= c.search_gap
+    rested = row.period - row.last_search >= c.tracking.search_gap
     someone = state.network.row[b].alive > 0
-    return c.search != 0 and rested and someone and (wide or row.log_miss < c.log_search_miss)
+    return c.tracking.search != 0 and rested and someone and (wide or row.log_miss < c.tracking.log_search_miss)
 
 
 @lean_kernel
-def settle(start, stop, cs, rows, state, outcome):
+def settle(start, stop, cs, rows, outcomes, handle):
     """The end of the period in the rows marked."""
+    state = state_at(handle)
     for b in range(start, stop):
         if rows[b]:
-            _settle(state, outcome, b, cs[0])
+            _settle(state, outcomes[b], b, cs[0])
 
 
 @lean_piece
-def _settle(state, outcome, b, c):
+def _settle(state, out, b, c):
     """The dead, the costs, and the prediction for the next period (eq. 16)."""
-    belief, out, target = state.belief.row[b], outcome.row[b], target_of(state, b)
+    belief, target = state.belief.row[b], target_of(state, b)
     mean, cov = belief.mean, belief.cov
-    _bury(state.network, b, c)
+    _remove_dead_nodes(state.network, b, c)
     total = 0.0
     for joules in out.energy_j:
         total += joules
@@ -319,19 +270,19 @@ def _settle(state, outcome, b, c):
     out.alive = state.network.row[b].alive
     luck = draws.bits(draws.stream(state.key[b], state.row[b].period, draws.POLICY), 0)
     state.row[b].luck = np.uint32(luck >> np.uint64(32))
-    if c.walks:
+    if c.tracking.walks:
         predict_walk(mean, cov, c, belief.predicted_mean, belief.predicted_cov)
     else:
-        predict_moments(mean, cov, c.period_s, c.q, belief.predicted_mean, belief.predicted_cov)
+        predict_moments(mean, cov, c.period_s, c.tracking.q, belief.predicted_mean, belief.predicted_cov)
 
 
 @lean_piece
-def _bury(network, b, c):
+def _remove_dead_nodes(network, b, c):
     """Take the dead out of the cluster. It ends with its head, unless the head is a node like the others."""
     standing, battery, members = network.row[b], network.battery[b], network.members[b]
     if standing.head >= 0 and battery[standing.head] <= 0.0:
         standing.head = -1
-        if c.receiver == radio.TO_HEAD:
+        if c.radio.to_head:
             standing.n_members = 0
     living = 0
     for k in range(standing.n_members):

@@ -2,73 +2,74 @@
 
 import numpy as np
 
+from wsn_env.compiled import draws
 from wsn_env.compiled.kernels import lean_kernel, lean_piece
-from wsn_env.models.physics import radio, sensing
-from wsn_env.models.physics.field import squared_distance
+from wsn_env.models.measurement.base import node_at, signal, tells
+from wsn_env.models.radio.base import reception
+from wsn_env.models.state import state_at
+from wsn_env.simulation import messages
 from wsn_env.simulation.period import sense, target_of, wake
 
 
 @lean_kernel
-def search(start, stop, cs, rows, found, state, outcome):
+def search(start, stop, cs, rows, found, outcomes, handle):
     """Every living node wakes for the period; the belief's position restarts at the centroid of those that detect.
 
     Args:
         rows: (B,) bool, where.
         found: (B,) bool, set where a node was heard.
     """
-    c = cs[0]
+    state, c = state_at(handle), cs[0]
     for b in range(start, stop):
         if not rows[b]:
             continue
-        outcome.row[b].searched = True
+        out = outcomes[b]
+        out.searched = True
         state.row[b].last_search = state.row[b].period
-        strongest = _wake_all(state, outcome, b, c)
+        strongest = _wake_all(state, out, b, c)
         if strongest >= 0:
             # The new head takes over (the velocity is handed to it) and hears the others.
-            if radio.take_over(strongest, state, outcome, b, c):
-                outcome.row[b].handover = True
-            outcome.row[b].detections = 0
+            if messages.take_over(strongest, state, out, b, c):
+                out.handover = True
+            out.detections = 0
             state.reports.count[b] = 0
+            target = target_of(state, b)
             for node in range(state.network.battery.shape[1]):
-                sense(node, strongest, radio.SEARCH, target_of(state, b), state, outcome, b, c)
+                sense(node, strongest, messages.SEARCH, target, state, out, b, c)
             found[b] = _restart_at_centroid(state, b, c)
-        elif c.model == sensing.BINARY:  # asked, all keep silent
+        else:  # asked, all keep silent
             state.sensed[b] = 0
             state.reports.bitmap[b] = 0
 
 
 @lean_piece
-def _wake_all(state, outcome, b, c):
+def _wake_all(state, out, b, c):
     """Wake-up call to all, sensing by those that slept.
 
-    Returns: the living node with the strongest signal of the target: the one that measured the greatest strength, the
-    nearest that detects it where nodes report positions, the first by number where they report one bit; -1: nobody.
+    Returns: the living node with the strongest signal of the target, the first by number where signals are alike; -1:
+    nobody detects it.
     """
     network, standing = state.network, state.network.row[b]
     positions, battery, members = network.positions[b], network.battery[b], network.members[b]
     key, period, target = state.key[b], state.row[b].period, target_of(state, b)
-    call = c.wakeup_bits * c.rx_j_per_bit
+    call = reception(c.radio, c.radio.wakeup_bits)
+    measuring = draws.stream(key, period, draws.MEASUREMENT)
     strongest, best, j = -1, -np.inf, 0
-    outcome.row[b].members = 0
+    out.members = 0
     for node in range(len(battery)):
         while j < standing.n_members and members[j] < node:
             j += 1
         awake = node == standing.head or (j < standing.n_members and members[j] == node)
-        if battery[node] <= 0.0 or not radio.spend(node, call, radio.SEARCH, state, outcome, b):
+        if battery[node] <= 0.0 or not messages.spend(node, call, messages.SEARCH, state, out, b):
             continue
-        if not awake and not wake(node, radio.SEARCH, state, outcome, b, c):
+        if not awake and not wake(node, messages.SEARCH, state, out, b, c):
             continue
-        outcome.row[b].members += 1
-        squared = squared_distance(positions, node, target[0], target[1])
-        if battery[node] > 0.0 and sensing.tells(key, period, node, squared, c):
-            if c.model == sensing.POSITION:
-                signal = -squared
-            elif c.model == sensing.BINARY:  # one bit has no strength: the first by number
-                signal = 0.0
-            else:
-                signal = sensing.measured_strength(key, period, node, squared, c)
-            if signal > best:
-                strongest, best = node, signal
+        out.members += 1
+        place = node_at(positions, node)
+        if battery[node] > 0.0 and tells(c.measurement, key, period, node, place, target[0], target[1], c):
+            strength = signal(c.measurement, measuring, node, place, target[0], target[1])
+            if strength > best:
+                strongest, best = node, strength
     return strongest
 
 

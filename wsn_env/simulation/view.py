@@ -11,10 +11,14 @@ from functools import cached_property
 
 import numpy as np
 
-from wsn_env.models.physics import field as geometry
-from wsn_env.simulation.state import BELIEF, NETWORK, RECEIVER, STATE, Cluster, Grid, Network, Reports, State
+from wsn_env.models.state import BELIEF, NETWORK, RECEIVER, STATE, Cluster, Grid, Knowledge, Network, Reports, State
+from wsn_env.simulation import geometry
 
 HEARING = ("latest_db", "gradient", "variance")  # of a beacon's receivers, what policies ask for
+
+
+def _part(name: str, meaning: str):
+    return property(lambda view: getattr(view.knowledge, name), doc=meaning)
 
 
 def _field(array: str, name: str, meaning: str):
@@ -25,12 +29,14 @@ def _field(array: str, name: str, meaning: str):
 class View:
     """The network's knowledge before it chooses the cluster of the next period; all arrays lead with B."""
 
-    row: np.ndarray  # (B,) STATE
-    belief: np.ndarray  # (B,) BELIEF
-    network: Network
-    reports: Reports
-    receivers: np.ndarray  # (B, S) RECEIVER of a beacon; else (B, 0)
+    knowledge: Knowledge
     _nearest: dict = field(default_factory=dict, repr=False)
+
+    row = _part("row", "(B,) STATE.")
+    belief = _part("belief", "(B,) BELIEF.")
+    network = _part("network", "Nodes, batteries, the standing cluster.")
+    reports = _part("reports", "What the head received in the last period.")
+    receivers = _part("receivers", "(B, S) RECEIVER, where the tracker learns its nodes' errors; else (B, 0).")
 
     period = _field("row", "period", "(B,) periods done.")
     lam = _field("row", "lam", "(B,) m/mJ.")
@@ -44,7 +50,7 @@ class View:
     @classmethod
     def of(cls, state: State) -> View:
         """The view of a state."""
-        return cls(state.row, state.belief.row, state.network, state.reports, state.belief.receivers)
+        return cls(state.knowledge)
 
     @property
     def positions(self) -> np.ndarray:
@@ -172,15 +178,18 @@ class View:
         members, network_row["n_members"] = _lists(others)
         node, count = _lists(a["detected"].astype(bool))
         value = np.take_along_axis(a["measured"], np.maximum(node, 0)[:, :, None].astype(np.int64), axis=1)
-        grid = Grid.zeros(rows, nodes)
-        positions = np.ascontiguousarray(a["positions"], np.float64)
-        geometry.index(positions, grid)
-        network = Network(network_row, positions, a["battery"], members, grid)
-        bitmap = a.get("bitmap", np.zeros((rows, 0), np.int8))
+        side = Grid.side(nodes)
+        grid = Grid.zeros(rows=rows, nodes=nodes, cells=side * side + 1)
+        grid.row["side"] = side
+        positions, battery = (np.ascontiguousarray(a[name], np.float64) for name in ("positions", "battery"))
+        network = Network(network_row, positions, battery, members, grid)
+        geometry.index(network)
+        bitmap = np.ascontiguousarray(a.get("bitmap", np.zeros((rows, 0), np.int8)), np.int8)
         receivers = np.zeros((rows, nodes if HEARING[0] in a else 0), RECEIVER)
         for name in HEARING if receivers.size else ():
             receivers[name] = a[name]
-        return cls(row, belief, network, Reports(count, node, value, bitmap), receivers)
+        reports = Reports(count, node, value, bitmap)
+        return cls(Knowledge(row, network, reports, belief, receivers))
 
 
 def _mask(nodes: np.ndarray, count: np.ndarray) -> np.ndarray:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from wsn_env.compiled import kernels as compiling
+from wsn_env.compiled import kernels
 from wsn_env.compiled.kernels import available_threads, over_rows, threads_for
 from wsn_env.filters import make_tracker
 from wsn_env.filters.particle import ParticleTracker
-from wsn_env.models.physics.constants import constants
-from wsn_env.models.physics.motion import motion_parameters
+from wsn_env.models.state import OUTCOME, Cluster, Grid, Outcome, State
 from wsn_env.scenario import Scenario
+from wsn_env.scenario.constants import constants
 from wsn_env.simulation import episode, period, search
-from wsn_env.simulation.state import OUTCOME, Cluster, Outcome, State
 
 LONG_LIST = 64
 
@@ -33,14 +32,10 @@ class World:
         self.scenario = scenario
         self.threads = threads or available_threads()
         self.tracker = make_tracker(scenario, self.threads, fast)
-        self._run = compiling.fast(period.run) if fast else period.run
+        self._run = kernels.fast(period.run) if fast else period.run
         self._constants = constants(scenario)
-        self._beginning = (
-            *motion_parameters(scenario),
-            episode.start_record(scenario),
-            episode.placed_nodes(scenario),
-            *episode.beacon_of(scenario),
-        )
+        self._tracks, self._packets = episode.Tracks(scenario), scenario.measurement.packets_of(scenario)
+        self._start, self._placed = episode.start_record(scenario), episode.placed_nodes(scenario)
 
     def reset(self, keys) -> State:
         """New episodes.
@@ -54,7 +49,12 @@ class World:
     def allocate(self, rows: int) -> State:
         """Arrays for `restart` to begin episodes in."""
         s = self.scenario
-        return State.zeros(rows, s.field.nodes, s.periods, self.tracker.particles, s.binary, s.hears)
+        nodes = s.field.nodes
+        lengths = dict(rows=rows, nodes=nodes, instants=s.periods + 1, particles=self.tracker.particles)
+        side = Grid.side(nodes)
+        state = State.zeros(**lengths, cells=side * side + 1, **s.measurement.axes(nodes))
+        state.network.grid.row["side"] = side
+        return state
 
     def restart(self, state: State, rows, keys, donate: bool = False) -> tuple[State, Outcome]:
         """New episodes in some rows of a batch; the others stay, but for the ledger of their last period.
@@ -72,13 +72,18 @@ class World:
             raise ValueError(f"rows {rows.shape} and keys {keys.shape}: must both be ({state.rows},)")
         state = state if donate else state.copy()
         outcome = _nothing_yet(state)
-        self._in_rows(rows, episode.begin, keys, *self._beginning, state)
+        threads = threads_for(rows, self.threads)
+        self._tracks.draw(rows, keys, state.track, threads)
+        over_rows(episode.begin, state.rows, threads, self._start, rows, keys, self._placed, state.handle)
+        if self._packets is not None:
+            self._packets.fill(rows, state, threads)
         self.tracker.start(state.key, state.period.copy(), rows, state.belief)
         if self.scenario.tracking.start == "search":
             self._search(rows, state, outcome)
-        self._in_rows(rows, period.settle, state, outcome)
-        if self.scenario.hears:
-            self._in_rows(rows, period.foretell_rows, self.tracker.maps, state.belief, state.network.positions)
+        self._in_rows(rows, period.settle, outcome.row, state.handle)
+        if self.scenario.measurement.lasting_errors:
+            maps, belief = self.tracker.maps, state.belief
+            self._in_rows(rows, period.foretell_rows, maps, belief.handle, state.network.positions)
         return state, outcome
 
     def step(self, state: State, cluster: Cluster, donate: bool = False) -> tuple[State, Outcome]:
@@ -99,22 +104,21 @@ class World:
         # Handover and invitations; the target moves; members sense and report; the head predicts and corrects;
         # broadcast, costs, and the prediction for the next period, unless a row must search first.
         if isinstance(self.tracker, ParticleTracker):  # all in one compiled call
-            known = self._constants, self.tracker.maps
-            arrays = heads, members, lost, outcome.row, *state.arrays()
-            n_lost = over_rows(self._run, state.rows, self.threads, *known, *arrays)
+            arguments = self._constants, self.tracker.maps, heads, members, lost, outcome.row, state.handle
+            n_lost = over_rows(self._run, state.rows, self.threads, *arguments)
         else:
-            self._over_rows(period.sense_and_report, heads, members, state, outcome)
+            self._over_rows(period.sense_and_report, heads, members, outcome.row, state.handle)
             resampled = np.zeros(state.rows, bool)
             self.tracker.correct(state.key, state.period.copy(), state.belief, state.network, state.reports, resampled)
-            n_lost = self._over_rows(period.conclude, resampled, lost, state, outcome)
+            n_lost = self._over_rows(period.conclude, resampled, lost, outcome.row, state.handle)
         if n_lost:
             self._search(lost, state, outcome)
-            self._in_rows(lost, period.settle, state, outcome)
+            self._in_rows(lost, period.settle, outcome.row, state.handle)
         return state, outcome
 
     def _search(self, rows, state: State, outcome: Outcome) -> None:
         found = np.zeros(state.rows, bool)
-        self._in_rows(rows, search.search, found, state, outcome)
+        self._in_rows(rows, search.search, found, outcome.row, state.handle)
         self.tracker.relocate(state.key, state.period.copy(), found, state.belief)
 
     def _over_rows(self, kernel, *arguments) -> int:

@@ -11,8 +11,8 @@ import numpy as np
 from wsn_env.envs.rendering.frame import frame
 from wsn_env.envs.rendering.plan import SIZE, SMALLEST
 from wsn_env.envs.rendering.trail import Trail
+from wsn_env.models.state import Outcome, State
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.state import Outcome, State
 
 RENDER_MODES = ("human", "rgb_array")
 FPS = 10

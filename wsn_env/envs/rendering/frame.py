@@ -24,8 +24,8 @@ from wsn_env.envs.rendering.palette import (
 )
 from wsn_env.envs.rendering.plan import SEEN, SIZE, WORDS_FROM, Plan, legend, plan_of, shows_radius, widened
 from wsn_env.envs.rendering.trail import Trail
+from wsn_env.models.state import State
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.state import State
 from wsn_env.simulation.view import View
 
 ELLIPSE = 5.991**0.5  # of a Gaussian in two dimensions 95 % lie within so many sds

@@ -76,13 +76,12 @@ def legend(scenario: Scenario) -> tuple[tuple[str, str], ...]:
 
 def shows_radius(scenario: Scenario) -> bool:
     """Whether nodes sense up to a radius that fits into the field."""
-    return not scenario.hears and scenario.radius_m < max(scenario.field.room_m)
+    return not scenario.measurement.lasting_errors and scenario.radius_m < max(scenario.field.room_m)
 
 
 def _heard(scenario: Scenario) -> str:
-    if scenario.binary:
-        return "detects"
-    return "has heard" if scenario.hears or scenario.radio.receiver == "target" else "reported"
+    verb = scenario.measurement.verb
+    return "has heard" if verb == "reported" and scenario.radio.receiver == "target" else verb
 
 
 def _flowed(entries, font, width) -> list[list[tuple[int, str, str]]]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wsn_env.simulation.state import OUTCOME, Outcome, State
+from wsn_env.models.state import OUTCOME, Outcome, State
 
 
 @dataclass(eq=False)

@@ -8,7 +8,9 @@ from math import floor
 import numpy as np
 
 from wsn_env.evaluation.progress import Progress
-from wsn_env.models.sections import Binary, Detection, Legs
+from wsn_env.models.detection.radius import Detection
+from wsn_env.models.measurement.binary import Binary
+from wsn_env.models.motion.legs import Legs
 from wsn_env.papers.rollout import Record, Trial, play_all
 from wsn_env.scenario import Scenario
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from wsn_env.filters.fingerprint import FingerprintMap, FingerprintNetwork, trained_network
 from wsn_env.filters.kalman import constant_velocity
-from wsn_env.models.physics.field import fixed_positions
-from wsn_env.models.physics.sensing import expected_strengths
+from wsn_env.filters.linear import LinearModel
+from wsn_env.models.field import fixed_positions
 from wsn_env.papers.grnn.systems import NOISE_DB, scenario_as_read, track
 from wsn_env.papers.report import Sheet
 
@@ -23,16 +23,16 @@ TRUTH_COV = np.diag([0.25, 0.02, 0.04, 0.01])  # what such programs believe of x
 def pitfalls(runs: int) -> Sheet:
     """Root mean square errors [m] of honest and of leaking evaluations, at T = 1 s."""
     rng, scenario = np.random.default_rng(SEED), scenario_as_read("grnn", PERIOD_S)
-    nodes, law = fixed_positions(scenario.field), scenario.measurement
+    nodes, model = fixed_positions(scenario.field), LinearModel(scenario)
     states = track(PERIOD_S)
     truth = states[1:, ::2]
     mirrored = truth * (-1, 1) + (scenario.field.side_m, 0)
     honest = trained_network(scenario)
-    on_path = FingerprintMap.survey(truth, nodes, law, np.inf, 1, rng)
+    on_path = FingerprintMap.survey(truth, nodes, model, np.inf, 1, rng)
     cheat = FingerprintNetwork(on_path, honest.width, honest.noise, 0.0)
 
     def fixes(network, points):
-        heard = expected_strengths(points, nodes, law) + rng.normal(0.0, NOISE_DB, (runs, len(points), len(nodes)))
+        heard = model.expected(points, nodes) + rng.normal(0.0, NOISE_DB, (runs, len(points), len(nodes)))
         located = [network.locate(np.arange(len(nodes)), strengths)[0] for strengths in heard.reshape(-1, len(nodes))]
         return np.reshape(located, (runs, len(points), 2))
 

@@ -9,9 +9,11 @@ from itertools import product
 import numpy as np
 
 from wsn_env.evaluation.progress import Progress
-from wsn_env.models.physics.field import fixed_positions
-from wsn_env.models.physics.sensing import linearised_strengths
-from wsn_env.models.sections import Detection, Legs, Rssi
+from wsn_env.filters.linear import LinearModel
+from wsn_env.models.detection.radius import Detection
+from wsn_env.models.field import fixed_positions
+from wsn_env.models.measurement.rssi import Rssi
+from wsn_env.models.motion.legs import Legs
 from wsn_env.papers.rollout import Record, Trial, play_all
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.scenario import RING_OF_EIGHT
@@ -94,7 +96,7 @@ def cramer_rao_bound(anchors: str, points: np.ndarray, noise_db: float = NOISE_D
     Returns: (K,) m.
     """
     scenario = scenario_as_read("snapshot", positions=ANCHORS[anchors])
-    _, slopes = linearised_strengths(points, fixed_positions(scenario.field), scenario.measurement)
+    slopes = LinearModel(scenario).slopes(points, fixed_positions(scenario.field))
     slopes = slopes / noise_db
     information = np.swapaxes(slopes, -1, -2) @ slopes
     return np.sqrt(np.trace(np.linalg.inv(information), axis1=-2, axis2=-1))

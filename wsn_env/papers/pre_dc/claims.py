@@ -10,11 +10,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from wsn_env.models.physics.sensing import detection_probability, joint_detection_probability
-from wsn_env.models.sections import Detection
 from wsn_env.papers.pre_dc.systems import MOTIONS, NODES, PARTICLES, Results
 from wsn_env.papers.report import Claim, Expectation, verdict
 from wsn_env.papers.rollout import Record, exceeds, keeps_falling
+from wsn_env.scenario import Scenario
+from wsn_env.scenario.sensing import detection_probability, joint_detection_probability
 
 STABLE = 1.25  # the error is stable while no later quarter of a run exceeds the first by this factor
 FLAT = 0.03  # an error that more particles change by less than this share is flat
@@ -40,7 +40,7 @@ PROBABILITIES = ((8.0, 0.6, 1e-9), (10.0, 0.0812, 5e-5), (12.0, 0.0, 1e-9))  # d
 def expected(results: Results) -> list[Expectation]:
     """Every figure known beforehand: p(d), and each cell of Table 2 against our reading's and the paper's."""
     figures = [
-        Expectation(f"p({d:g} m)", p, tolerance, float(detection_probability(d, Detection())))
+        Expectation(f"p({d:g} m)", p, tolerance, float(detection_probability(d, Scenario())))
         for d, p, tolerance in PROBABILITIES
     ]
     three, two = joint_detection_probability([[0.6, 0.6, 0.6], [0.6, 0.6, 0.0]])

@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from wsn_env.envs.rendering.colours import BLACK, BLUE, DARK, GREEN, GREY, VERMILION
-from wsn_env.models.physics.sensing import detection_probability
-from wsn_env.models.sections import Detection
+from wsn_env.models.detection.radius import Detection
 from wsn_env.papers.pre_dc.systems import MOTIONS, PARTICLES, SYSTEMS, Results
 from wsn_env.papers.report import Sheet, by_period, new_axes, tidy, write_sheet
 from wsn_env.papers.rollout import standard_error
 from wsn_env.reports.pictures import write_picture
+from wsn_env.scenario import Scenario
+from wsn_env.scenario.sensing import detection_probability
 
 STATIC, EKF, PRE_DC = VERMILION, BLUE, BLACK
 LOOKS = {  # system: label, style of its line
@@ -60,7 +61,7 @@ def write(out: Path, results: Results) -> None:
 def detection_curve(detection: Detection) -> Sheet:
     """Fig. 1: p(d) of eqs. 2-3."""
     distance = np.linspace(0.0, 15.0, 151)
-    p = detection_probability(distance, detection)
+    p = detection_probability(distance, Scenario(detection=detection))
     return Sheet(("distance_m", "probability"), list(zip(distance, p, strict=True)))
 
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from wsn_env.evaluation.progress import Progress
-from wsn_env.models.sections import Position, Straight
+from wsn_env.models.measurement.position import Position
+from wsn_env.models.motion.straight import Straight
 from wsn_env.papers.rollout import Record, Trial, play_all
 from wsn_env.scenario import Scenario
 

@@ -11,7 +11,8 @@ from math import sqrt
 
 import numpy as np
 
-from wsn_env.models.physics.acoustics import absorption_db_per_km
+from wsn_env.models.acoustics import absorption_db_per_km
+from wsn_env.models.state import PURPOSES
 from wsn_env.papers.report import Claim, Expectation, verdict
 from wsn_env.papers.rollout import Record, exceeds, standard_error
 from wsn_env.papers.underwater.systems import (
@@ -26,7 +27,6 @@ from wsn_env.papers.underwater.systems import (
     median_rms_m,
 )
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.state import PURPOSES
 
 MET = 3 * sqrt(2)  # standard errors of one of two figures that are equally noisy
 LOSES, KEEPS = 0.15, 0.03  # shares of lost runs

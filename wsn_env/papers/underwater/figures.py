@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from wsn_env.envs.rendering.colours import BLUE, GREEN, GREY, PURPLE, SKY, VERMILION, YELLOW
-from wsn_env.models.physics.acoustics import absorption_db_per_km, ambient_noise_db
+from wsn_env.models.acoustics import absorption_db_per_km, ambient_noise_db
+from wsn_env.models.state import PURPOSES
 from wsn_env.papers.report import Sheet, by_period, new_axes, write_sheet
 from wsn_env.papers.rollout import Record
 from wsn_env.papers.underwater.claims import energy_j
@@ -24,7 +25,6 @@ from wsn_env.papers.underwater.systems import (
 )
 from wsn_env.reports.pictures import write_picture
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.state import PURPOSES
 
 COLOURS = dict(zip(PURPOSES, (SKY, GREEN, YELLOW, BLUE, PURPLE, GREY), strict=True))
 LOOKS = {

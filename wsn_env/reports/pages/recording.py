@@ -11,8 +11,8 @@ from wsn_env.envs.rendering import colours
 from wsn_env.envs.rendering.plan import legend, shows_radius
 from wsn_env.evaluation.policies import Policy
 from wsn_env.evaluation.rollout import episodes
+from wsn_env.models.state import Outcome, State
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.state import Outcome, State
 from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World
 
@@ -129,4 +129,6 @@ def _frame(state: State, outcome: Outcome, scenario: Scenario) -> dict:
         "search": bool(outcome.searched[0]),
         "handover": bool(outcome.handover[0]),
     }
-    return frame | ({"detects": np.flatnonzero(View.of(state).sees[0]).tolist()} if scenario.binary else {})
+    return frame | (
+        {"detects": np.flatnonzero(View.of(state).sees[0]).tolist()} if scenario.measurement.reports_state else {}
+    )

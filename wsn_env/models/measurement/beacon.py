@@ -8,8 +8,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from wsn_env.compiled.elementary import log
+from wsn_env.models.measurement.base import Line, Measurement
+from wsn_env.models.measurement.beacon_levels import foretell_levels, weigh_levels
+from wsn_env.models.measurement.beacon_packets import Packets
 from wsn_env.models.quantity import ScenarioError, quantity
-from wsn_env.models.sections.sensing import Measurement
+from wsn_env.models.recordings.replay import load_map
 
 MAP_LEAVES = 0.15  # of the static field's variance, where a map was made on other days
 
@@ -30,7 +34,6 @@ class Beacon(Measurement):
     the recordings of Danis, Naskali, Cemgil & Ersoy (2022), see `Ble-v0`.
     """
 
-    code: ClassVar[int] = 5
     at_1m_db: float | tuple[float, ...] = -59.1  # P0; a number, or one a receiver
     exponents: float | tuple[float, ...] = 1.7  # n
     heights_m: float | tuple[float, ...] = 0.0  # of the receivers
@@ -126,3 +129,101 @@ class Beacon(Measurement):
                 raise ScenarioError(f"Beacon.{name} has {len(array)} entries: must have one for each of {nodes} nodes")
             columns.append(np.broadcast_to(array, nodes))
         return np.stack([columns[0], columns[1], (columns[2] - self.beacon_m) ** 2], axis=1)
+
+    allocates: ClassVar[bool] = False
+    lasting_errors: ClassVar[bool] = True
+    verb: ClassVar[str] = "has heard"
+
+    def check(self, scenario) -> None:
+        """Levels of all receivers, none of what silence or a search would tell."""
+        self.of_nodes(scenario.field.nodes)
+        tracking = scenario.tracking
+        if tracking.search:
+            raise ScenarioError("Tracking.search = True: allowed is False with Beacon levels")
+        if tracking.silent_information or tracking.fusion != "joint":
+            raise ScenarioError(
+                f"Tracking.silent_information = {tracking.silent_information}, Tracking.fusion = {tracking.fusion!r}:"
+                " allowed are False and 'joint' with Beacon levels"
+            )
+
+    def packets_of(self, scenario) -> Packets:
+        """Where an episode's packets come from."""
+        return Packets(self, scenario)
+
+    def residual_maps(self, nodes: int) -> np.ndarray:
+        """(S, nx, ny) float32 dB: what the tracker's mean levels are off by, cell by cell; (0, 0, 0): no map.
+
+        Raises:
+            ScenarioError: a map of other receivers.
+        """
+        if self.residual_map is None:
+            return np.zeros((0, 0, 0), np.float32)
+        maps = load_map(self.residual_map)
+        if len(maps) != nodes or not maps.size:
+            raise ScenarioError(
+                f"Beacon.residual_map = {self.residual_map!r}: has shape {maps.shape}: must begin with {nodes}"
+                " receivers"
+            )
+        return maps
+
+    def constants(self, scenario) -> dict[str, float]:
+        """What the tracker takes levels for."""
+        heard = self.heard(scenario.period_s)
+        return dict(
+            floor_m=self.floor_m,
+            bias_variance=self.bias_db**2,
+            bias_kept=math.exp(-scenario.period_s / self.bias_s),
+            white_variance=self.white_db**2,
+            temper=self.temper,
+            heard=heard,
+            report_packets=self.packets(scenario.period_s) / heard,
+        )
+
+    @staticmethod
+    def sample(m, stream, number, node, x, y):
+        """An episode's packets are drawn at its start, see `Packets`; `news` finds them."""
+        return 0.0, 0.0
+
+    @staticmethod
+    def news(m, memory, key, period, number, node, x, y, asked, c):
+        """A receiver reports the packets that it has heard: their mean level, and how many they are."""
+        level, count = memory.packets[number, 0], memory.packets[number, 1]
+        return count > 0.0, np.float64(level), np.float64(count), np.float64(count)
+
+    @staticmethod
+    def log_miss(m, mean, cov, positions, head, members, count, c):
+        """A receiver hears its beacon anywhere."""
+        awake = count + (head >= 0)
+        return awake * log(max(1.0 - m.heard, 1e-12))
+
+    @staticmethod
+    def chance(m, node, x, y, xx, xy, yy, c):
+        """That of hearing any packet."""
+        return m.heard
+
+    @staticmethod
+    def packets_a_report(m):
+        """Those that a receiver hears if it hears any."""
+        return m.report_packets
+
+    @staticmethod
+    def linearise(m, node, x, y, xx, xy, yy):
+        """The tracker has said what to expect."""
+        own = node.learnt
+        return (Line(own.expected, own.slope_x, own.slope_y, max(own.variance, 1e-12)),)
+
+    @staticmethod
+    def weigh(m, px, py, log_weights, first, step, node, value):
+        """Levels are weighed together with their biases, in `weigh_period`."""
+
+    @staticmethod
+    def weigh_period(m, x, log_weights, belief, network, reports, b, c, maps, scratch):
+        """The tempered log likelihoods of the reported levels; the biases are corrected by them."""
+        weigh_levels(m, x, log_weights, belief, network, reports, b, maps, scratch)
+
+    @staticmethod
+    def foretell(m, belief, positions, b, c, maps, scratch):
+        """What each receiver should report in the period to come, as a line over the predicted positions."""
+        t = c.tracking
+        way = 0.5 * c.period_s * (1.0 + t.velocity_kept) if t.walks else c.period_s
+        foretell_levels(m, way, belief, positions, b, maps, scratch)

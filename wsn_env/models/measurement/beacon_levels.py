@@ -1,4 +1,4 @@
-"""A beacon's levels in the particle filter: a bias for every receiver, and a target that walks in a room.
+"""A beacon's levels in the particle filter: a bias for every receiver.
 
 Each receiver's level is off the mean of its distance by a bias, which lasts for seconds (the place, people, the way
 that the beacon is held). Every particle carries the mean of each bias, given its own path, and all share its variance,
@@ -8,79 +8,57 @@ second's level for news, and is surer than it may be by a factor of three in the
 
 import numpy as np
 
-from wsn_env.compiled import draws
-from wsn_env.compiled.draws import normal_pair32
+from wsn_env.compiled.arrays import record
 from wsn_env.compiled.elementary import F, exp32, log32
 from wsn_env.compiled.kernels import lean_piece, piece
-from wsn_env.models.physics.motion import ROUGHENING_M
 from wsn_env.models.recordings.replay import CELL_M
-from wsn_env.simulation.state import SILENT_DB
 
-LANES = 16  # as in `kernels`
+LANES = 16  # as in filters.kernels
 
-
-@lean_piece
-def scatter_walkers(stream, x, log_weights, sd_ms, side_m, depth_m):
-    """Particles anywhere in the room, with any velocity."""
-    n = x.shape[1]
-    for i in range(n):
-        x[0, i] = F(side_m * draws.uniform(stream, 4 * i))
-        x[2, i] = F(depth_m * draws.uniform(stream, 4 * i + 1))
-        vx, vy = normal_pair32(draws.bits(stream, 4 * i + 2))
-        x[1, i], x[3, i] = F(sd_ms) * vx, F(sd_ms) * vy
-    log_weights[:] = F(0)
-
-
-@lean_piece
-def walk(stream, x, c):
-    """One period of a walk: v' = a v + sd sqrt(1 - a^2) e, x' = x + T (v + v') / 2, reflected at the walls."""
-    kept = F(c.velocity_kept)
-    fresh = F(c.velocity_sd * np.sqrt(1.0 - c.velocity_kept * c.velocity_kept))
-    half, rough = F(0.5 * c.period_s), F(ROUGHENING_M)
-    n = x.shape[1]
-    for axis in (0, 2):
-        place, velocity = x[axis], x[axis + 1]
-        wall = F(c.side_m if axis == 0 else c.depth_m)
-        for i in range(n):
-            e, shift = normal_pair32(draws.bits(stream, axis * n + i))
-            before = velocity[i]
-            after = kept * before + fresh * e
-            moved = place[i] + half * (before + after) + rough * shift
-            inside = min(max(moved if moved >= F(0) else -moved, F(0)), F(2) * wall)
-            inside = F(2) * wall - inside if inside > wall else inside
-            place[i] = inside
-            velocity[i] = after if inside == moved else -after
+RECEIVER = record(
+    [
+        ("at_1m_db", "f8"),  # its mean level: at_1m_db - slope ln(d^2 + height_m2)
+        ("slope", "f8"),
+        ("height_m2", "f8"),
+        ("bias_variance", "f8"),  # of its level about the mean, beside the packets' own noise, alike for all particles
+        ("latest_db", "f8"),  # last heard; SILENT_DB if it has listened since in vain; 0 before it ever has
+        ("gradient", "f8", 2),  # of the level to come by position, over the predicted belief [dB/m]
+        ("variance", "f8"),  # of what it should report, about that [dB^2]
+    ]
+)
+SILENT_DB = -95.0
 
 
 @lean_piece
-def weigh_levels(x, log_weights, belief, network, reports, b, c, maps, room):
+def weigh_levels(m, x, log_weights, belief, network, reports, b, maps, scratch):
     """Add the tempered log likelihoods of the reported levels, and correct the biases by them.
 
     Args:
-        maps: (S, nx, ny) dB to add to the mean level by cells of the room; (0, 0, 0): nothing.
-        room: (P,) float32.
+        m: the beacon's constants.
+        maps: (S, nx, ny) dB to add to the mean level by cells of the hall; (0, 0, 0): nothing.
+        scratch: (P,) float32.
     """
     receivers, biases, positions, n = belief.receivers[b], belief.biases[b], network.positions[b], x.shape[1]
     for j in range(len(receivers)):
-        kept, fade = c.bias_kept, F(c.bias_kept)
-        receivers[j].bias_variance = kept * kept * receivers[j].bias_variance + (1.0 - kept * kept) * c.bias_variance
+        kept, fade = m.bias_kept, F(m.bias_kept)
+        receivers[j].bias_variance = kept * kept * receivers[j].bias_variance + (1.0 - kept * kept) * m.bias_variance
         own = biases[j]
         for i in range(n):
             own[i] *= fade
     _note_silence(receivers, network, b)
-    floor = F(c.floor_m * c.floor_m)
+    floor = F(m.floor_m * m.floor_m)
     for k in range(reports.count[b]):
         node = reports.node[b, k]
         receiver, own, level = receivers[node], biases[node], F(reports.value[b, k, 0])
-        variance = receiver.bias_variance + c.white_variance / reports.value[b, k, 1]
+        variance = receiver.bias_variance + m.white_variance / reports.value[b, k, 1]
         share = receiver.bias_variance / variance
-        gain, half = F(share), F(0.5 * c.temper / variance)
+        gain, half = F(share), F(0.5 * m.temper / variance)
         offset = level - F(receiver.at_1m_db)
-        expect_fall(x[0], x[2], positions[node], receiver, floor, room)
+        expect_fall(x[0], x[2], positions[node], receiver, floor, scratch)
         if len(maps) > 0:
-            add_map(x[0], x[2], maps[node], room)
+            add_map(x[0], x[2], maps[node], scratch)
         for i in range(n):
-            r = offset - room[i] - own[i]
+            r = offset - scratch[i] - own[i]
             log_weights[i] -= half * (r * r)
             own[i] += gain * r
         receiver.bias_variance *= 1.0 - share
@@ -116,18 +94,18 @@ def _note_silence(receivers, network, b):
 
 
 @lean_piece
-def draw_biases(biases, ancestors, room):
+def draw_biases(biases, ancestors, scratch):
     """Give every particle its ancestor's biases."""
     for j in range(len(biases)):
         own = biases[j]
         for i in range(len(ancestors)):
-            room[i] = own[ancestors[i]]
+            scratch[i] = own[ancestors[i]]
         for i in range(len(ancestors)):
-            own[i] = room[i]
+            own[i] = scratch[i]
 
 
 @piece
-def foretell(belief, positions, b, c, maps, room):
+def foretell_levels(m, way_s, belief, positions, b, maps, scratch):
     """What each receiver should report in the period to come, as a line over the predicted positions.
 
     The weighted covariances of position and level over the particles, moved on without noise, give the regression
@@ -138,8 +116,9 @@ def foretell(belief, positions, b, c, maps, room):
     shape, where a derivative at the mean would not.
 
     Args:
+        way_s: how far a particle goes on for each m/s [s].
         positions: (S, 2) of the receivers [m].
-        maps, room: as for `weigh_levels`.
+        maps, scratch: as for `weigh_levels`.
     """
     x, log_weights, receivers, biases = (
         belief.particles[b],
@@ -148,9 +127,9 @@ def foretell(belief, positions, b, c, maps, room):
         belief.biases[b],
     )
     mean, n = belief.row[b].predicted_mean, x.shape[1]
-    way = F(0.5 * c.period_s * (1.0 + c.velocity_kept)) if c.walks else F(c.period_s)
+    way = F(way_s)
     x0, y0 = F(mean[0]), F(mean[2])  # differences from about the mean lose nothing in float32
-    kept, floor = F(c.bias_kept), F(c.floor_m * c.floor_m)
+    kept, floor = F(m.bias_kept), F(m.floor_m * m.floor_m)
     points, lanes, s = np.empty((5, n), np.float32), np.empty((6, LANES), np.float32), np.empty(6)
     for i in range(n):
         points[0, i] = exp32(log_weights[i])
@@ -164,13 +143,13 @@ def foretell(belief, positions, b, c, maps, room):
     determinant = vxx * vyy - vxy * vxy
     for j in range(len(receivers)):
         receiver, own = receivers[j], biases[j]
-        expect_fall(points[3], points[4], positions[j], receiver, floor, room)
+        expect_fall(points[3], points[4], positions[j], receiver, floor, scratch)
         if len(maps) > 0:
-            add_map(points[3], points[4], maps[j], room)
-        about = room[0]
+            add_map(points[3], points[4], maps[j], scratch)
+        about = scratch[0]
         for i in range(n):
-            room[i] += kept * own[i] - about
-        _sum_levels(points, room, lanes, s)
+            scratch[i] += kept * own[i] - about
+        _sum_levels(points, scratch, lanes, s)
         level = s[0] / total
         cx, cy = s[1] / total - level * mx, s[2] / total - level * my
         rest = max(s[3] / total - level * level, 0.0)
@@ -178,9 +157,9 @@ def foretell(belief, positions, b, c, maps, room):
         if determinant > 1e-9 * vxx * vyy and determinant > 1e-12:
             gx, gy = (vyy * cx - vxy * cy) / determinant, (vxx * cy - vxy * cx) / determinant
             rest = max(rest - gx * cx - gy * cy, 0.0)
-        own_variance = c.bias_kept * c.bias_kept * (receiver.bias_variance - c.bias_variance) + c.bias_variance
+        own_variance = m.bias_kept * m.bias_kept * (receiver.bias_variance - m.bias_variance) + m.bias_variance
         receiver.gradient[0], receiver.gradient[1] = gx, gy
-        receiver.variance = rest + own_variance + c.white_variance / c.report_packets
+        receiver.variance = rest + own_variance + m.white_variance / m.report_packets
 
 
 @lean_piece

@@ -1,56 +1,10 @@
-"""Where the nodes stand, and which are near."""
+"""Which nodes are near: a grid of cells for every field."""
 
 import numpy as np
 
-from wsn_env.compiled import draws
-from wsn_env.compiled.kernels import lean_kernel, lean_piece, over_rows, piece
-from wsn_env.models.sections import Field
-
-
-@piece
-def scatter(stream, side_m, positions):
-    """Draw the positions (S, 2) uniformly in the square [m]."""
-    for i in range(len(positions)):
-        positions[i, 0] = side_m * draws.uniform(stream, 2 * i)
-        positions[i, 1] = side_m * draws.uniform(stream, 2 * i + 1)
-
-
-@piece
-def lay_out(stream, side_m, jitter, positions):
-    """Draw the positions (S, 2), S a square number: each within `jitter` cells of the middle of its own cell [m]."""
-    across = int(np.round(np.sqrt(len(positions))))
-    cell = side_m / across
-    for i in range(len(positions)):
-        positions[i, 0] = cell * (i % across + 0.5 + jitter * (2.0 * draws.uniform(stream, 2 * i) - 1.0))
-        positions[i, 1] = cell * (i // across + 0.5 + jitter * (2.0 * draws.uniform(stream, 2 * i + 1) - 1.0))
-
-
-def fixed_positions(field: Field):
-    """Where the nodes stand in every episode alike: (S, 2) m, or None where each episode draws its own."""
-    if field.positions is not None:
-        return np.array(field.positions)
-    if field.field_seed is None:
-        return None
-    positions = np.empty((field.nodes, 2))
-    _place_by_key(draws.key_of_seed(field.field_seed), field.side_m, field.layout == "grid", field.jitter, positions)
-    return positions
-
-
-@lean_kernel
-def _place_by_key(key, side_m, in_grid, jitter, positions):
-    stream = draws.stream(key, 0, draws.FIELD)
-    if in_grid:
-        lay_out(stream, side_m, jitter, positions)
-    else:
-        scatter(stream, side_m, positions)
-
-
-@lean_piece
-def squared_distance(positions, i, x, y):
-    """Squared distance of node i to (x, y) [m^2]."""
-    dx = positions[i, 0] - x
-    dy = positions[i, 1] - y
-    return dx * dx + dy * dy
+from wsn_env.compiled.kernels import lean_kernel, lean_piece, over_rows
+from wsn_env.models.field import squared_distance
+from wsn_env.models.state import network_at
 
 
 @lean_piece
@@ -191,7 +145,8 @@ def ring_candidates(network, b, x, y, ring_m, nodes, distances):
 
 
 @lean_kernel
-def _nearest_rows(start, stop, network, points, ring_m, nodes, distances):
+def _nearest_rows(start, stop, network_handle, points, ring_m, nodes, distances):
+    network = network_at(network_handle)
     for b in range(start, stop):
         find_candidates(network, b, points[b, 0], points[b, 1], ring_m, nodes[b], distances[b])
 
@@ -206,14 +161,15 @@ def find_candidates(network, b, x, y, ring_m, nodes, distances):
 
 
 @lean_kernel
-def _index_rows(start, stop, positions, grid):
+def _index_rows(start, stop, network_handle):
+    network = network_at(network_handle)
     for b in range(start, stop):
-        index_nodes(positions[b], grid, b)
+        index_nodes(network.positions[b], network.grid, b)
 
 
-def index(positions, grid) -> None:
-    """Fill the grid of every row for positions (B, S, 2)."""
-    _index_rows(0, len(positions), positions, grid)
+def index(network) -> None:
+    """Fill the grid of every row by the positions (B, S, 2)."""
+    _index_rows(0, len(network.positions), network.handle)
 
 
 def nearest(network, points, count: int, ring_m: float = 0.0, threads: int = 1):
@@ -231,7 +187,7 @@ def nearest(network, points, count: int, ring_m: float = 0.0, threads: int = 1):
     rows = len(points)
     nodes, distances = np.empty((rows, count), np.int64), np.empty((rows, count))
     points = np.ascontiguousarray(points, np.float64)
-    over_rows(_nearest_rows, rows, threads, network, points, float(ring_m), nodes, distances)
+    over_rows(_nearest_rows, rows, threads, network.handle, points, float(ring_m), nodes, distances)
     return nodes, distances
 
 

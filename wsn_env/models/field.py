@@ -7,6 +7,8 @@ from math import isqrt
 
 import numpy as np
 
+from wsn_env.compiled import draws
+from wsn_env.compiled.kernels import lean_kernel, lean_piece, piece
 from wsn_env.models.quantity import ScenarioError, Section, quantity
 
 
@@ -69,3 +71,49 @@ class Field(Section):
     def room_m(self) -> tuple[float, float]:
         """Extent along x and y."""
         return self.side_m, self.side_m if self.depth_m is None else self.depth_m
+
+
+@piece
+def scatter(stream, side_m, positions):
+    """Draw the positions (S, 2) uniformly in the square [m]."""
+    for i in range(len(positions)):
+        positions[i, 0] = side_m * draws.uniform(stream, 2 * i)
+        positions[i, 1] = side_m * draws.uniform(stream, 2 * i + 1)
+
+
+@piece
+def lay_out(stream, side_m, jitter, positions):
+    """Draw the positions (S, 2), S a square number: each within `jitter` cells of the middle of its own cell [m]."""
+    across = int(np.round(np.sqrt(len(positions))))
+    cell = side_m / across
+    for i in range(len(positions)):
+        positions[i, 0] = cell * (i % across + 0.5 + jitter * (2.0 * draws.uniform(stream, 2 * i) - 1.0))
+        positions[i, 1] = cell * (i // across + 0.5 + jitter * (2.0 * draws.uniform(stream, 2 * i + 1) - 1.0))
+
+
+def fixed_positions(field: Field):
+    """Where the nodes stand in every episode alike: (S, 2) m, or None where each episode draws its own."""
+    if field.positions is not None:
+        return np.array(field.positions)
+    if field.field_seed is None:
+        return None
+    positions = np.empty((field.nodes, 2))
+    _place_by_key(draws.key_of_seed(field.field_seed), field.side_m, field.layout == "grid", field.jitter, positions)
+    return positions
+
+
+@lean_kernel
+def _place_by_key(key, side_m, in_grid, jitter, positions):
+    stream = draws.stream(key, 0, draws.FIELD)
+    if in_grid:
+        lay_out(stream, side_m, jitter, positions)
+    else:
+        scatter(stream, side_m, positions)
+
+
+@lean_piece
+def squared_distance(positions, i, x, y):
+    """Squared distance of node i to (x, y) [m^2]."""
+    dx = positions[i, 0] - x
+    dy = positions[i, 1] - y
+    return dx * dx + dy * dy

@@ -9,19 +9,15 @@ import math
 import numpy as np
 
 from wsn_env.compiled import draws
+from wsn_env.compiled.arrays import record
 from wsn_env.compiled.elementary import HALF_PI, F, cos_turns32, exp, log
-from wsn_env.compiled.kernels import piece
-from wsn_env.models.physics.recordings import replayed_packets
-from wsn_env.models.quantity import ScenarioError
-from wsn_env.models.recordings.replay import load_map
-from wsn_env.models.sections import Replay
-from wsn_env.scenario import Scenario
+from wsn_env.compiled.kernels import kernel, over_rows, piece
 
 WAVES = 64  # that make a receiver's static field
 SHORTEST = 1e-3  # correlation lengths: shorter waves are white noise to everything here
 PER_NEPER = 10.0 / math.log(10.0)
 
-BEACON_RECORD = np.dtype(
+BEACON_RECORD = record(
     [
         (name, "f8")
         for name in (
@@ -32,44 +28,56 @@ BEACON_RECORD = np.dtype(
 )
 
 
-def beacon_record(scenario: Scenario) -> np.ndarray:
-    """What a beacon's simulation needs, an array of one; zeros where there is none."""
-    record = np.zeros(1, BEACON_RECORD)
-    if scenario.hears:
+class Packets:
+    """Fills an episode's packets into a state, and what the tracker knows of the receivers."""
+
+    def __init__(self, beacon, scenario):
+        self._beacon = np.zeros(1, BEACON_RECORD)
         for name in BEACON_RECORD.names:
-            record[name] = getattr(scenario.measurement, name)
-    return record
+            self._beacon[name] = getattr(beacon, name)
+        self._receivers = beacon.of_nodes(scenario.field.nodes)
+        self._receivers[:, 1] *= 0.5 * PER_NEPER
+        self._recorded = scenario.motion.recorded_packets(scenario)
+        self._numbers = scenario.period_s, beacon.bias_db**2
+
+    def fill(self, rows, state, threads: int) -> None:
+        """Begin episodes in the rows marked (B,)."""
+        own = self._beacon, self._receivers, self._recorded, *self._numbers
+        belief = state.belief
+        arrays = state.key, state.track, state.network.positions, state.packets, belief.receivers, belief.biases
+        over_rows(_fill, len(rows), threads, *own, rows, *arrays)
 
 
-def receivers_of(scenario: Scenario) -> np.ndarray:
-    """(S, 3) of each receiver: level at 1 m [dBm], fall by the log of the squared distance, squared height [m^2]."""
-    if not scenario.hears:
-        return np.zeros((0, 3))
-    table = scenario.measurement.of_nodes(scenario.field.nodes)
-    table[:, 1] *= 0.5 * PER_NEPER
-    return table
-
-
-def recorded_packets(scenario: Scenario) -> np.ndarray:
-    """(periods + 1, S, 2) of a recording; (0, 0, 2) where packets are drawn."""
-    return replayed_packets(scenario) if isinstance(scenario.motion, Replay) else np.zeros((0, 0, 2), np.float32)
-
-
-def maps_of(scenario: Scenario) -> np.ndarray:
-    """(S, nx, ny) float32 dB: what the tracker's mean levels are off by, cell by cell; (0, 0, 0): no map.
-
-    Raises:
-        ScenarioError: no map, or one of other receivers.
-    """
-    if not scenario.hears or scenario.measurement.residual_map is None:
-        return np.zeros((0, 0, 0), np.float32)
-    path, nodes = scenario.measurement.residual_map, scenario.field.nodes
-    maps = load_map(path)
-    if len(maps) != nodes or not maps.size:
-        raise ScenarioError(
-            f"Beacon.residual_map = {path!r}: has shape {maps.shape}: must begin with {nodes} receivers"
-        )
-    return maps
+@kernel
+def _fill(
+    start,
+    stop,
+    beacons,
+    receivers,
+    recorded,
+    period_s,
+    bias_variance,
+    rows,
+    keys,
+    tracks,
+    positions,
+    packets,
+    known,
+    biases,
+):
+    for b in range(start, stop):
+        if not rows[b]:
+            continue
+        if len(recorded) > 0:
+            packets[b] = recorded
+        else:
+            draw_packets(keys[b], tracks[b], positions[b], receivers, period_s, beacons[0], packets[b])
+        for j in range(len(receivers)):
+            own = known[b, j]
+            own.at_1m_db, own.slope, own.height_m2 = receivers[j, 0], receivers[j, 1], receivers[j, 2]
+            own.bias_variance = bias_variance
+            own.latest_db = 0.0
+        biases[b] = np.float32(0.0)
 
 
 @piece

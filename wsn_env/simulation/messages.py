@@ -2,24 +2,21 @@
 
 A radio reaches every node at a price that grows with distance (eq. 5); a modem sends over one hop at one price. Reports
 may be lost and are tried again (assumption d of Xiang & Guo, 2013); control packets always arrive. A sink in the middle
-of the field and the target's own node have energy of their own, so that only the network's side is on the books: who
-reports to them pays for sending, who is called by them pays for hearing it. All pieces work on row b of the state and
-of the period's outcome.
+of the field and the target's own node have energy of their own, so that only the network's side counts: who reports to
+them pays for sending, who is called by them pays for hearing it. All pieces work on row b of the state; `out` is the
+row's record of the period (OUTCOME).
 """
-
-import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.kernels import lean_piece
-from wsn_env.models.physics.field import squared_distance
-from wsn_env.models.sections import RECEIVERS
+from wsn_env.models.field import squared_distance
+from wsn_env.models.radio.base import reception, relayed, transmission
 
 SENSING, HANDOVER, INVITATION, REPORT, BROADCAST, SEARCH = range(6)
-TO_HEAD, TO_SINK, TO_TARGET = range(len(RECEIVERS))
 
 
 @lean_piece
-def spend(node, joules, purpose, state, outcome, b):
+def spend(node, joules, purpose, state, out, b):
     """Charge a node; what it cannot pay empties it. Returns whether it could pay in full."""
     battery, ledger = state.network.battery[b], state.ledger
     before = battery[node]
@@ -30,13 +27,13 @@ def spend(node, joules, purpose, state, outcome, b):
             ledger.payer[b, ledger.count[b]] = node
             ledger.count[b] += 1
         ledger.spent_j[b, node] += paid
-        outcome.row[b].energy_j[purpose] += paid
+        out.energy_j[purpose] += paid
         state.network.row[b].alive -= battery[node] == 0.0
     return before >= joules
 
 
 @lean_piece
-def close_books(ledger, b):
+def clear_ledger(ledger, b):
     """Forget the last period's payments."""
     for k in range(ledger.count[b]):
         ledger.spent_j[b, ledger.payer[b, k]] = 0.0
@@ -44,51 +41,38 @@ def close_books(ledger, b):
 
 
 @lean_piece
-def transmission(bits, squared, c):
-    """Energy of sending `bits` over a squared distance [J]: bits (e1 + e2 d^2), eq. 5."""
-    return bits * (c.tx_j_per_bit + c.amplifier_j_per_bit_m2 * squared)
-
-
-@lean_piece
-def relayed(bits, squared, c):
-    """The same over as many hops as it takes, with what the relays pay for receiving."""
-    hops = max(np.ceil(np.sqrt(squared) / c.hop_m), 1.0)
-    return hops * transmission(bits, squared, c) + (hops - 1.0) * bits * c.rx_j_per_bit
-
-
-@lean_piece
 def in_one_hop(node, other, positions, c):
     """Whether a packet goes from node to node at once."""
-    return squared_distance(positions, node, positions[other, 0], positions[other, 1]) <= c.hop_m * c.hop_m
+    return squared_distance(positions, node, positions[other, 0], positions[other, 1]) <= c.radio.hop_m * c.radio.hop_m
 
 
 @lean_piece
-def send(sender, receiver, bits, purpose, state, outcome, b, c):
+def send(sender, receiver, bits, purpose, state, out, b, c):
     """One packet from node to node (eq. 5). Returns whether both could pay, so that it arrived if not lost."""
     positions, battery = state.network.positions[b], state.network.battery[b]
     squared = squared_distance(positions, sender, positions[receiver, 0], positions[receiver, 1])
-    if battery[sender] <= 0.0 or not spend(sender, transmission(bits, squared, c), purpose, state, outcome, b):
+    if battery[sender] <= 0.0 or not spend(sender, transmission(c.radio, bits, squared), purpose, state, out, b):
         return False
-    return battery[receiver] > 0.0 and spend(receiver, bits * c.rx_j_per_bit, purpose, state, outcome, b)
+    return battery[receiver] > 0.0 and spend(receiver, reception(c.radio, bits), purpose, state, out, b)
 
 
 @lean_piece
-def send_out(sender, x, y, bits, purpose, state, outcome, b, c):
+def send_out(sender, x, y, bits, purpose, state, out, b, c):
     """One packet from a node to (x, y), out of the network (eq. 5). Returns whether the node could pay."""
     squared = squared_distance(state.network.positions[b], sender, x, y)
     living = state.network.battery[b, sender] > 0.0
-    return living and spend(sender, transmission(bits, squared, c), purpose, state, outcome, b)
+    return living and spend(sender, transmission(c.radio, bits, squared), purpose, state, out, b)
 
 
 @lean_piece
 def outside(mean, c):
     """Where a receiver outside the network stands, as far as the network knows: the sink in the middle of the field,
     the target where it is predicted. (A price of the true way would tell the target's distance through batteries.)"""
-    return (mean[0], mean[2]) if c.receiver == TO_TARGET else (0.5 * c.side_m, 0.5 * c.depth_m)
+    return (mean[0], mean[2]) if c.radio.to_target else (0.5 * c.side_m, 0.5 * c.depth_m)
 
 
 @lean_piece
-def report(node, head, packets, purpose, state, outcome, b, c):
+def report(node, head, packets, purpose, state, out, b, c):
     """A node's report with its retries. Returns whether it was received; to the head its own is free.
 
     Args:
@@ -97,30 +81,30 @@ def report(node, head, packets, purpose, state, outcome, b, c):
     Beyond one hop nothing is sent: after a search the new head may lie so far, for a modem.
     """
     positions = state.network.positions[b]
-    if c.receiver == TO_HEAD:
+    if c.radio.to_head:
         x, y = positions[head, 0], positions[head, 1]
         if state.network.battery[b, head] <= 0.0 or node == head:
             return state.network.battery[b, head] > 0.0
     else:
         x, y = outside(state.belief.row[b].predicted_mean, c)
-    if squared_distance(positions, node, x, y) > c.hop_m * c.hop_m:
+    if squared_distance(positions, node, x, y) > c.radio.hop_m * c.radio.hop_m:
         return False
     packet = draws.SEARCH_PACKET if purpose == SEARCH else draws.PACKET
     stream = draws.stream(state.key[b], state.row[b].period, packet)
-    for attempt in range(c.tries):
-        if c.receiver == TO_HEAD:
-            sent = send(node, head, packets * c.report_bits, purpose, state, outcome, b, c)
+    for attempt in range(c.radio.tries):
+        if c.radio.to_head:
+            sent = send(node, head, packets * c.radio.report_bits, purpose, state, out, b, c)
         else:
-            sent = send_out(node, x, y, packets * c.report_bits, purpose, state, outcome, b, c)
+            sent = send_out(node, x, y, packets * c.radio.report_bits, purpose, state, out, b, c)
         if not sent:
             return False
-        if draws.uniform(stream, 16 * node + attempt) < c.packet_success:
+        if draws.uniform(stream, 16 * node + attempt) < c.radio.packet_success:
             return True
     return False
 
 
 @lean_piece
-def broadcast(state, outcome, b, c):
+def broadcast(state, out, b, c):
     """The head's word to resample: one transmission as far as the farthest living member, who all pay to hear it."""
     network = state.network
     head, nodes, count = network.row[b].head, network.members[b], network.row[b].n_members
@@ -132,38 +116,38 @@ def broadcast(state, outcome, b, c):
             farthest = max(farthest, squared)
     if farthest < 0.0 or battery[head] <= 0.0:
         return
-    if spend(head, transmission(c.broadcast_bits, farthest, c), BROADCAST, state, outcome, b):
+    if spend(head, transmission(c.radio, c.radio.broadcast_bits, farthest), BROADCAST, state, out, b):
         for k in range(count):
             if battery[nodes[k]] > 0.0:
-                spend(nodes[k], c.broadcast_bits * c.rx_j_per_bit, BROADCAST, state, outcome, b)
+                spend(nodes[k], reception(c.radio, c.radio.broadcast_bits), BROADCAST, state, out, b)
 
 
 @lean_piece
-def _hand_over(old, head, state, outcome, b, c):
+def _hand_over(old, head, state, out, b, c):
     """The old head's packet to the new one; beyond one hop it is relayed, and the old head pays for its relays.
 
     Returns: as `send`.
     """
     positions, battery = state.network.positions[b], state.network.battery[b]
     squared = squared_distance(positions, old, positions[head, 0], positions[head, 1])
-    if battery[old] <= 0.0 or not spend(old, relayed(c.handover_bits, squared, c), HANDOVER, state, outcome, b):
+    if battery[old] <= 0.0 or not spend(old, relayed(c.radio, c.radio.handover_bits, squared), HANDOVER, state, out, b):
         return False
-    return battery[head] > 0.0 and spend(head, c.handover_bits * c.rx_j_per_bit, HANDOVER, state, outcome, b)
+    return battery[head] > 0.0 and spend(head, reception(c.radio, c.radio.handover_bits), HANDOVER, state, out, b)
 
 
 @lean_piece
-def take_over(head, state, outcome, b, c):
+def take_over(head, state, out, b, c):
     """An awake node leads, alone as yet. Returns whether the head's role was handed over: a sink or the target needs no
     head, so that the node is one like the others there."""
     standing = state.network.row[b]
     old = standing.head
     standing.head = head
     standing.n_members = 0
-    return c.receiver == TO_HEAD and old >= 0 and old != head and _hand_over(old, head, state, outcome, b, c)
+    return c.radio.to_head and old >= 0 and old != head and _hand_over(old, head, state, out, b, c)
 
 
 @lean_piece
-def form(head, chosen, count, state, outcome, b, c):
+def form(head, chosen, count, state, out, b, c):
     """Make the chosen cluster the standing one: handover from the old head, invitations to new members.
 
     Only members that hear their invitation join. A new head invites all of them. A sink or the target calls only who
@@ -177,14 +161,14 @@ def form(head, chosen, count, state, outcome, b, c):
     """
     standing, members = state.network.row[b], state.network.members[b]
     old, old_count = standing.head, standing.n_members
-    heads_call = c.receiver == TO_HEAD
-    handed = take_over(head, state, outcome, b, c)
-    price = c.invitation_bits * c.rx_j_per_bit
+    heads_call = c.radio.to_head
+    handed = take_over(head, state, out, b, c)
+    price = reception(c.radio, c.radio.invitation_bits)
     called = not heads_call and head != old
     for k in range(old_count):
         called &= members[k] != head
     if called:
-        spend(head, price, INVITATION, state, outcome, b)
+        spend(head, price, INVITATION, state, out, b)
     n, j = 0, 0
     for k in range(count):
         node = chosen[k]
@@ -192,9 +176,9 @@ def form(head, chosen, count, state, outcome, b, c):
             j += 1
         awake = node == old or (j < old_count and members[j] == node)
         if heads_call:
-            joins = (awake and head == old) or send(head, node, c.invitation_bits, INVITATION, state, outcome, b, c)
+            joins = (awake and head == old) or send(head, node, c.radio.invitation_bits, INVITATION, state, out, b, c)
         else:
-            joins = awake or spend(node, price, INVITATION, state, outcome, b)
+            joins = awake or spend(node, price, INVITATION, state, out, b)
         if joins:
             chosen[n] = node  # n <= k: what is overwritten has been read
             n += 1

@@ -1,0 +1,1 @@
+"""When nodes detect, a kind a file."""

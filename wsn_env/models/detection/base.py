@@ -1,0 +1,112 @@
+"""What a detection rule has to say, and the defaults of what it need not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from wsn_env.compiled import draws
+from wsn_env.compiled.elementary import F, log
+from wsn_env.models.kinds import Kind, by_kind
+
+LEAST, MOST = 1e-6, 1.0 - 1e-6  # probabilities as a filter takes them: no report rules a particle out
+POINT = 1.7320508075688772  # sds: Gauss and Hermite's three points
+
+
+@dataclass(frozen=True)
+class DetectionRule(Kind):
+    """Base of the rules by which nodes detect.
+
+    A kind has `distances_m` and
+
+        probability(d, m, distance) -> probability that a node detects a target at this distance [m]
+
+    `d` holds the rule's constants, `m` those of what nodes measure. The functions after it have defaults.
+    """
+
+    abstract: ClassVar[bool] = True
+    role: ClassVar[str] = "detection rule"
+    required: ClassVar[tuple[str, ...]] = ("probability", "distances_m")
+    optional: ClassVar[tuple[str, ...]] = (
+        "mean_probability",
+        "stream_of",
+        "detects",
+        "weigh_detection",
+        "weigh_silence",
+    )
+
+    values_decide: ClassVar[bool] = False  # whether the measured value decides, so that detecting tells of the value
+
+    def check(self, scenario) -> None:
+        """Raise ScenarioError where it does not fit the rest of the scenario."""
+
+    def constants(self, scenario) -> dict[str, float]:
+        """The settings, and the distances."""
+        radius_m, reach_m = self.distances_m(scenario.measurement)
+        return super().constants(scenario) | {"radius_m": radius_m, "reach_m": reach_m}
+
+    def distances_m(self, measurement) -> tuple[float, float]:
+        """The sensing radius, and the reach, from where on nothing is detected [m]."""
+        raise NotImplementedError
+
+    @staticmethod
+    def mean_probability(d, m, dx, dy, xx, xy, yy):
+        """`probability` averaged over a target believed to be at (dx, dy) from the node with covariance (xx, xy, yy).
+
+        Here by Gauss and Hermite's 3 x 3 points.
+        """
+        a = np.sqrt(max(xx, 1e-12))
+        b = xy / a
+        e = np.sqrt(max(yy - b * b, 0.0))
+        total = 0.0
+        for i in range(-1, 2):
+            for j in range(-1, 2):
+                weight = (2.0 / 3.0 if i == 0 else 1.0 / 6.0) * (2.0 / 3.0 if j == 0 else 1.0 / 6.0)
+                x, y = dx + POINT * a * i, dy + POINT * (b * i + e * j)
+                total += weight * probability(d, m, np.sqrt(x * x + y * y))
+        return total
+
+    @staticmethod
+    def stream_of(d, key, period):
+        """The random numbers that decide who detects in a period."""
+        return draws.stream(key, period, draws.DETECTION)
+
+    @staticmethod
+    def detects(d, m, stream, number, node, x, y):
+        """Whether node `number`, if awake, detects a target at (x, y)."""
+        dx, dy = node.x - x, node.y - y
+        return draws.uniform(stream, number) < probability(d, m, np.sqrt(dx * dx + dy * dy))
+
+    @staticmethod
+    def weigh_detection(d, m, x, log_weights, node):
+        """Add to every particle the log probability that the node, which reported, detects a target there."""
+        for i in range(x.shape[1]):
+            dx, dy = x[0, i] - F(node.x), x[2, i] - F(node.y)
+            p = probability(d, m, np.float64(np.sqrt(dx * dx + dy * dy)))
+            log_weights[i] += F(log(min(max(p, LEAST), MOST)))
+
+    @staticmethod
+    def weigh_silence(d, m, x, log_weights, node, delivery):
+        """Add log(1 - delivery p(d)): the node was awake and nothing was heard of it.
+
+        Args:
+            delivery: probability that a report of the node arrives.
+        """
+        for i in range(x.shape[1]):
+            dx, dy = x[0, i] - F(node.x), x[2, i] - F(node.y)
+            p = probability(d, m, np.float64(np.sqrt(dx * dx + dy * dy)))
+            log_weights[i] += F(log(1.0 - delivery * min(max(p, LEAST), MOST)))
+
+
+@by_kind
+def probability(d, m, distance):
+    """Probability that a node detects a target at this distance [m]."""
+
+
+mean_probability = by_kind(DetectionRule.mean_probability)
+stream_of = by_kind(DetectionRule.stream_of)
+detects = by_kind(DetectionRule.detects)
+weigh_detection = by_kind(DetectionRule.weigh_detection)
+weigh_silence = by_kind(DetectionRule.weigh_silence)

@@ -1,0 +1,170 @@
+"""Kinds: a measurement, a detection rule, a motion or a radio is one class in one file.
+
+Its fields are its settings, `constants` makes the numbers of them that kernels read, and its static functions are what
+it does, compiled. Kernels pick the functions by the *type* of the constants: each kind's record has a type of its own,
+marked with its name and a stamp of its code, so that a kernel is compiled for the kinds that meet in a scenario, is
+found again on disk while their code is the same, and never runs with a kind that it does not know.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Any, ClassVar
+
+import numpy as np
+from numba import types
+from numba.core.errors import TypingError
+from numba.extending import overload
+
+from wsn_env.compiled.arrays import record
+from wsn_env.compiled.kernels import fast, lean_piece, piece
+from wsn_env.compiled.stamp import stamp
+from wsn_env.models.quantity import ScenarioError, Section
+
+
+@dataclass(frozen=True)
+class Kind(Section):
+    """Base of all kinds. A role (measurement, ...) is a direct subclass; its kinds are that class's subclasses."""
+
+    abstract: ClassVar[bool] = True  # no kind itself; said by each base class anew
+    role: ClassVar[str]
+    required: ClassVar[tuple[str, ...]]  # functions that every kind of the role has to have
+    optional: ClassVar[tuple[str, ...]]  # functions for which the role has a default
+
+    allocates: ClassVar[bool] = True  # whether its functions may make arrays; those that need not are a little faster
+
+    def constants(self, scenario) -> dict[str, float]:
+        """Numbers for the kind's functions, by name; here every setting that is a number.
+
+        Args:
+            scenario: the Scenario that the kind is part of.
+        """
+        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        return {name: value for name, value in values.items() if isinstance(value, (int, float, np.number))}
+
+    def check_functions(self) -> None:
+        """Raise ScenarioError unless the kind has every function that its role requires."""
+        for name in self.required:
+            if not callable(getattr(type(self), name, None)):
+                raise ScenarioError(
+                    f"{type(self).__name__} has no {name}(...): a {self.role} must have {', '.join(self.required)}"
+                )
+
+
+_marked: dict[str, type[Kind]] = {}  # kinds by the mark in the type of their constants
+
+
+def constants_type(kind: Kind, scenario) -> np.dtype:
+    """The type of a kind's record of constants: its mark, and the constants by name."""
+    kind.check_functions()
+    numbers = kind.constants(scenario)
+    mark = f"{type(kind).__name__}_{_code_stamp(type(kind))}"
+    _marked[mark] = type(kind)
+    return record([(mark, "i1"), *((name, _number_type(value)) for name, value in numbers.items())])
+
+
+def fill_constants(row, kind: Kind, scenario) -> None:
+    """Write a kind's constants into its record."""
+    for name, value in kind.constants(scenario).items():
+        row[name] = value
+
+
+def _number_type(value) -> str:
+    return "i8" if isinstance(value, (bool, int, np.integer)) else "f8"
+
+
+@cache
+def _code_stamp(kind: type[Kind]) -> str:
+    own = {name: getattr(kind, name, None) for name in (*kind.required, *kind.optional)}
+    return stamp(*(function for function in own.values() if function is not None), more=sorted(own))
+
+
+def by_kind(function: Callable) -> Any:
+    """What kernels call for a role's function: that of the kind whose constants are the first argument.
+
+    Args:
+        function: of the role, for its name and arguments.
+    """
+    dispatching = _dispatcher(function, _strict)
+    dispatching.fast_twin = _dispatcher(function, _fast)
+    return dispatching
+
+
+def _dispatcher(function: Callable, compiled: Callable) -> Any:
+    name, arguments = function.__name__, ", ".join(inspect.signature(function).parameters)
+
+    def choose(constants):
+        if not isinstance(constants, types.Record):
+            raise TypingError(f"{name}: takes a kind's constants first, not {constants}")
+        return compiled(*_function_of(next(iter(constants.fields)), name))
+
+    def find(constants):
+        return _function_of(constants.dtype.names[0], name)[0]
+
+    first = arguments.partition(",")[0]
+    source = (
+        f"def {name}({arguments}):\n    return find({first})({arguments})\n"
+        f"def typing({arguments}):\n    chosen = choose({first})\n    return lambda {arguments}: chosen({arguments})\n"
+    )
+    made: dict[str, Any] = {"find": find, "choose": choose}
+    exec(source, made)  # noqa: S102  Numba wants the arguments under their own names
+    dispatching = made[name]
+    dispatching.__module__, dispatching.__qualname__ = function.__module__, f"by_kind.{name}"
+    dispatching.__doc__ = function.__doc__
+    overload(dispatching, jit_options={"error_model": "numpy", "nogil": True, "fastmath": False})(made["typing"])
+    return dispatching
+
+
+def _function_of(mark: str, name: str) -> tuple[Callable, bool]:
+    """A kind's function, and whether it may allocate."""
+    kind = _marked.get(mark)
+    if kind is None:
+        raise TypingError(f"{name}: {mark} marks no kind")
+    function = getattr(kind, name, None)
+    if function is None:
+        raise TypingError(f"{kind.__name__} has no {name}(...)")
+    return function, kind.allocates
+
+
+@cache
+def _strict(function: Callable, allocates: bool) -> Any:
+    if hasattr(function, "py_func"):
+        return function
+    return piece(function) if allocates else lean_piece(function)
+
+
+@cache
+def _fast(function: Callable, allocates: bool) -> Any:
+    return fast(_strict(function, allocates))
+
+
+class Registry:
+    """The kinds of a role by name: that of the file in the role's package that the class stands in."""
+
+    def __init__(self, role: type[Kind], package: str):
+        self.role, self._package = role, package
+
+    @property
+    def kinds(self) -> dict[str, type[Kind]]:
+        """Every shipped kind."""
+        return _found(self.role, self._package)
+
+    def name_of(self, kind: type[Kind]) -> str:
+        """Of a shipped kind its name; of another its class's."""
+        return next((name for name, known in self.kinds.items() if known is kind), kind.__name__)
+
+
+@cache
+def _found(role: type[Kind], package: str) -> dict[str, type[Kind]]:
+    found: dict[str, type[Kind]] = {}
+    for module in iter_modules(import_module(package).__path__, f"{package}."):
+        for value in vars(import_module(module.name)).values():
+            if isinstance(value, type) and issubclass(value, role) and value.__module__ == module.name:
+                if not vars(value).get("abstract", False):
+                    found[module.name.rpartition(".")[2]] = value
+    return found

@@ -1,0 +1,317 @@
+"""What a measurement has to say, and the defaults of what it need not.
+
+Kernels call the functions at the end of this file with a kind's constants first; see `models.kinds`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from wsn_env.compiled import draws
+from wsn_env.compiled.elementary import F, log
+from wsn_env.compiled.kernels import lean_piece
+from wsn_env.models.detection.base import detects, mean_probability, probability, stream_of
+from wsn_env.models.kinds import Kind, by_kind
+from wsn_env.models.quantity import ScenarioError
+
+EXPECT_AT = 1.7320508075688772  # sds: Gauss and Hermite's three points
+
+
+class Line(NamedTuple):
+    """One measured number, linearised in the target's position."""
+
+    expected: float
+    slope_x: float  # per m
+    slope_y: float
+    variance: float  # of its noise
+
+
+class Node(NamedTuple):
+    """A node as its measurement knows it."""
+
+    x: float  # m
+    y: float
+    learnt: Line  # what the tracker has learnt that its next report should be, where errors last; else zeros
+
+
+class Memory(NamedTuple):
+    """What a field's nodes and their head keep of states and packets; arrays of length 0 where the kind keeps none."""
+
+    sensed: np.ndarray  # (S,) int8: what each node sensed last, known to itself alone
+    bitmap: np.ndarray  # (S,) int8: the states that the head knows
+    packets: np.ndarray  # (S, 2): mean level and number of the packets in reach
+
+
+@dataclass(frozen=True)
+class Measurement(Kind):
+    """Base of what nodes measure.
+
+    A kind has `sample` and `linearise`, and `log_likelihood` or else `weigh`:
+
+        sample(m, stream, number, node, x, y) -> (value, second value)
+            What node `number` measures of a target at (x, y); random numbers are draws of `stream` at `number`.
+        log_likelihood(m, value, second, node, x, y) -> log density of a measured value, but for a constant, at most 0
+            For one particle at (x, y), float32.
+        linearise(m, node, x, y, xx, xy, yy) -> a tuple of `Line`s, one for each number of the value
+            About a target that is believed to be at (x, y) with covariance (xx, xy, yy); zeros: that is there.
+
+    `m` holds the kind's constants, `node` is a `Node`; all lengths in m. The functions after these have defaults.
+    """
+
+    abstract: ClassVar[bool] = True
+    role: ClassVar[str] = "measurement"
+    required: ClassVar[tuple[str, ...]] = ("sample", "linearise", "weigh")
+    optional: ClassVar[tuple[str, ...]] = (
+        "log_likelihood",
+        "unwrap",
+        "signal",
+        "tells",
+        "news",
+        "take_note",
+        "finds_target",
+        "log_miss",
+        "chance",
+        "informs",
+        "equal_everywhere",
+        "packets_a_report",
+        "weigh_period",
+        "foretell",
+        "level",
+        "level_slope",
+    )
+
+    values: ClassVar[int] = 1  # numbers of a report
+    reports_state: ClassVar[bool] = False  # whether nodes remember a state and report how it stands
+    lasting_errors: ClassVar[bool] = False  # whether errors are alike from period to period, so that silence tells
+    # nothing and a tracker has to learn them
+    order: ClassVar[str] = "information"  # the menu's order of merit that suits it
+    verb: ClassVar[str] = "reported"  # what a node has done that was heard
+
+    def check_functions(self) -> None:
+        """Raise ScenarioError unless the kind has what is required, and a likelihood."""
+        super().check_functions()
+        if type(self).weigh is Measurement.weigh and not hasattr(type(self), "log_likelihood"):
+            raise ScenarioError(
+                f"{type(self).__name__} has no log_likelihood(...): a measurement must have it, or weigh"
+            )
+
+    @property
+    def independent(self) -> bool:
+        """Whether reports depend on nothing but the target of their period: what a Kalman filter supposes."""
+        return not (self.reports_state or self.lasting_errors)
+
+    def axes(self, nodes: int) -> dict[str, int]:
+        """Lengths of the state's arrays that only some kinds use."""
+        return {"states": nodes if self.reports_state else 0, "receivers": nodes if self.lasting_errors else 0}
+
+    def check(self, scenario) -> None:
+        """Raise ScenarioError where it does not fit the rest of the scenario."""
+
+    def packets_of(self, scenario):
+        """Where an episode's packets come from, drawn or recorded before it begins; None: there are none."""
+        return None
+
+    def residual_maps(self, nodes: int) -> np.ndarray:
+        """(S, nx, ny) float32: what a tracker knows that values are off by, cell by cell; (0, 0, 0): nothing."""
+        return np.zeros((0, 0, 0), np.float32)
+
+    def ring_m(self, radius_m: float) -> float:
+        """How far from the target a node tells most; here as near as may be."""
+        return 0.0
+
+    def fixes(self, values: np.ndarray, places: np.ndarray, radius_m: float) -> tuple[np.ndarray, float]:
+        """Where reports alone put the target: here where the nodes (n, 2) stand. Points (n, 2), variance [m, m^2]."""
+        return places, radius_m**2 / 2
+
+    def signals(self, values: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """(...,) how strong reports (..., 2) of nodes at (..., 2) are; here the value itself."""
+        return values[..., 0]
+
+    def raised(self, signal: np.ndarray, by_db: float) -> np.ndarray:
+        """A signal so much stronger; here a power."""
+        return signal * 10 ** (by_db / 10)
+
+    @staticmethod
+    def weigh(m, px, py, log_weights, first, step, node, value):
+        """Add a report's log likelihood to every step-th particle from the first on.
+
+        Args:
+            px, py: (P,) float32 m.
+            value: (2,) what was reported.
+        """
+        first_value, second = F(value[0]), F(value[1])
+        for i in range(first, len(px), step):
+            log_weights[i] += F(log_likelihood(m, first_value, second, node, px[i], py[i]))
+
+    @staticmethod
+    def unwrap(m, value, about):
+        """The same value, told near another: of an angle, without the jump of a whole turn."""
+        return value
+
+    @staticmethod
+    def signal(m, stream, number, node, x, y):
+        """How strong a node finds the target, for the choice of a head after a search: here alike everywhere."""
+        return 0.0
+
+    @staticmethod
+    def tells(m, key, period, number, node, x, y, c):
+        """Whether a node takes the target to be there: here, it detects it."""
+        return detects(c.detection, c.measurement, stream_of(c.detection, key, period), number, node, x, y)
+
+    @staticmethod
+    def news(m, memory, key, period, number, node, x, y, asked, c):
+        """What an awake node has to report.
+
+        Args:
+            memory: of the row's nodes; the node's own may change.
+            asked: whether the head is looking for a lost target.
+
+        Returns: whether it has anything, the two numbers of the value, how many packets long the report is.
+        """
+        if not tells(m, key, period, number, node, x, y, c):
+            return False, 0.0, 0.0, 1.0
+        value, second = sample(m, draws.stream(key, period, draws.MEASUREMENT), number, node, x, y)
+        return True, value, second, 1.0
+
+    @staticmethod
+    def take_note(m, memory, number, value):
+        """What the head keeps of a report that has come."""
+
+    @staticmethod
+    def finds_target(m, memory, reports, head, members, count):
+        """Whether anything was heard of the target: here, any report.
+
+        Args:
+            reports: their number.
+            head, members, count: who is awake; head -1: nobody.
+        """
+        return reports > 0
+
+    @staticmethod
+    def log_miss(m, mean, cov, positions, head, members, count, c):
+        """Log of the probability that none of the awake nodes would have been heard, averaged over the belief.
+
+        The average is Gauss and Hermite's with 3 x 3 points over the belief's position (exact to degree 5).
+
+        Args:
+            mean, cov: (4,), (4, 4) the belief about this period before its reports.
+            positions: (S, 2).
+            head, members, count: who is awake; head -1: nobody.
+        """
+        a = np.sqrt(max(cov[0, 0], 1e-12))
+        b = cov[0, 2] / a
+        d = np.sqrt(max(cov[2, 2] - b * b, 0.0))
+        total = 0.0
+        for i in range(-1, 2):
+            for j in range(-1, 2):
+                weight = (2.0 / 3.0 if i == 0 else 1.0 / 6.0) * (2.0 / 3.0 if j == 0 else 1.0 / 6.0)
+                u, v = EXPECT_AT * i, EXPECT_AT * j
+                x, y = mean[0] + a * u, mean[2] + b * u + d * v
+                missed = 1.0
+                for k in range(-1 if head >= 0 else 0, count):
+                    node = head if k < 0 else members[k]
+                    dx, dy = positions[node, 0] - x, positions[node, 1] - y
+                    seen = probability(c.detection, c.measurement, np.sqrt(dx * dx + dy * dy))
+                    missed *= 1.0 - (c.radio.head_delivery if k < 0 else c.radio.delivery) * seen
+                total += weight * missed
+        return log(max(total, 1e-300))
+
+    @staticmethod
+    def chance(m, node, x, y, xx, xy, yy, c):
+        """Probability that a node has something to report of a target believed to be at (x, y), cov (xx, xy, yy)."""
+        return mean_probability(c.detection, c.measurement, x - node.x, y - node.y, xx, xy, yy)
+
+    @staticmethod
+    def informs(m, detection):
+        """Probability that a node's being awake tells what `linearise` says; here that of its detecting."""
+        return detection
+
+    @staticmethod
+    def equal_everywhere(m):
+        """Whether a report tells the same wherever its node stands."""
+        return False
+
+    @staticmethod
+    def packets_a_report(m):
+        """How many packets long a report is, on average."""
+        return 1.0
+
+    @staticmethod
+    def weigh_period(m, x, log_weights, belief, network, reports, b, c, maps, scratch):
+        """Weigh the particles with all that row b's head has heard in a period.
+
+        Args:
+            x, log_weights: (4, P), (P,) float32, changed in place.
+            maps, scratch: (S, nx, ny) dB and (P,) float32, for kinds that want them.
+        """
+        count, positions = reports.count[b], network.positions[b]
+        for j in range(count):
+            node, value = node_at(positions, reports.node[b, j]), reports.value[b, j]
+            if c.tracking.pooled:
+                weigh(m, x[0], x[2], log_weights, j, count, node, value)
+            else:  # a constant stride of 1 lets the compiler use vectors
+                weigh(m, x[0], x[2], log_weights, 0, 1, node, value)
+
+    @staticmethod
+    def foretell(m, belief, positions, b, c, maps, scratch):
+        """Note what each node should report in the period to come; only kinds that learn their errors do."""
+
+
+@lean_piece
+def node_at(positions, number):
+    """A node of a row's positions (S, 2) [m], of whose errors nothing has been learnt."""
+    return Node(positions[number, 0], positions[number, 1], Line(0.0, 0.0, 0.0, 0.0))
+
+
+@lean_piece
+def node_of(sensors, number):
+    """A node of a row's Sensors, with what the tracker has learnt of it."""
+    positions, learnt = sensors.positions, Line(0.0, 0.0, 0.0, 0.0)
+    if len(sensors.receivers) > 0:
+        own = sensors.receivers[number]
+        learnt = Line(0.0, own.gradient[0], own.gradient[1], own.variance)
+    return Node(positions[number, 0], positions[number, 1], learnt)
+
+
+@by_kind
+def sample(m, stream, number, node, x, y):
+    """What a node measures of a target at (x, y), if it detects it: the two numbers of its value."""
+
+
+@by_kind
+def log_likelihood(m, value, second, node, x, y):
+    """Log density of a value that a node has reported, for a particle at (x, y) (float32)."""
+
+
+@by_kind
+def linearise(m, node, x, y, xx, xy, yy):
+    """A `Line` for each number of the value, about a target believed to be at (x, y) with covariance (xx, xy, yy)."""
+
+
+@by_kind
+def level(m, squared):
+    """The mean level [dB] at a squared distance [m^2], for kinds that have one."""
+
+
+@by_kind
+def level_slope(m, squared):
+    """Its derivative by the distance, over the distance [dB/m^2]; times (dx, dy), its gradient."""
+
+
+weigh = by_kind(Measurement.weigh)
+unwrap = by_kind(Measurement.unwrap)
+signal = by_kind(Measurement.signal)
+tells = by_kind(Measurement.tells)
+news = by_kind(Measurement.news)
+take_note = by_kind(Measurement.take_note)
+finds_target = by_kind(Measurement.finds_target)
+log_miss = by_kind(Measurement.log_miss)
+chance = by_kind(Measurement.chance)
+informs = by_kind(Measurement.informs)
+equal_everywhere = by_kind(Measurement.equal_everywhere)
+packets_a_report = by_kind(Measurement.packets_a_report)
+weigh_period = by_kind(Measurement.weigh_period)
+foretell = by_kind(Measurement.foretell)

@@ -1,0 +1,61 @@
+"""A node reports where it takes the target to be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from wsn_env.compiled import draws
+from wsn_env.compiled.elementary import F
+from wsn_env.models.measurement.base import Line, Measurement
+from wsn_env.models.quantity import quantity
+
+
+@dataclass(frozen=True)
+class Position(Measurement):
+    """A node's own noisy position of the target: z = (x, y) + noise. Xiang & Guo (2013), eq. 7."""
+
+    noise_m: float = quantity(2.0, "sd of each coordinate", above=0)
+
+    allocates: ClassVar[bool] = False
+    values: ClassVar[int] = 2
+    order: ClassVar[str] = "nearest"
+
+    def fixes(self, values: np.ndarray, places: np.ndarray, radius_m: float) -> tuple[np.ndarray, float]:
+        """The reports themselves."""
+        return values, self.noise_m**2
+
+    def signals(self, values: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """A power that falls with the square of the distance to what the node reports."""
+        offset = values - places
+        return 1.0 / np.maximum((offset * offset).sum(axis=-1), 1e-6)
+
+    @staticmethod
+    def sample(m, stream, number, node, x, y):
+        e0, e1 = draws.normal_pair(stream, number)
+        return x + m.noise_m * e0, y + m.noise_m * e1
+
+    @staticmethod
+    def weigh(m, px, py, log_weights, first, step, node, value):
+        half_precision = F(0.5 / max(m.noise_m * m.noise_m, 1e-20))
+        zx, zy = F(value[0]), F(value[1])
+        for i in range(first, len(px), step):
+            dx = px[i] - zx
+            dy = py[i] - zy
+            log_weights[i] -= half_precision * (dx * dx + dy * dy)
+
+    @staticmethod
+    def linearise(m, node, x, y, xx, xy, yy):
+        variance = m.noise_m * m.noise_m
+        return Line(x, 1.0, 0.0, variance), Line(y, 0.0, 1.0, variance)
+
+    @staticmethod
+    def signal(m, stream, number, node, x, y):
+        dx, dy = node.x - x, node.y - y
+        return -(dx * dx + dy * dy)
+
+    @staticmethod
+    def equal_everywhere(m):
+        return True

@@ -1,0 +1,1 @@
+"""How targets move, a kind a file."""

@@ -1,0 +1,50 @@
+"""Recorded motion, from CSV files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from wsn_env.compiled import draws
+from wsn_env.models.motion.base import Motion
+from wsn_env.models.quantity import ScenarioError, quantity
+from wsn_env.models.recordings.tracks import read_track
+
+
+@dataclass(frozen=True)
+class RecordedMotion(Motion):
+    """Base of motions whose tracks are known beforehand."""
+
+    abstract: ClassVar[bool] = True
+
+    @staticmethod
+    def draw(m, stream, course, track):
+        """One of them, by the episode's key."""
+        track[:] = course.recorded[int(draws.uniform(stream, 0) * len(course.recorded))]
+
+
+@dataclass(frozen=True)
+class Recorded(RecordedMotion):
+    """Recorded tracks from CSV files with columns t, x, y [s, m, m]; an episode picks one by its key.
+
+    Each is resampled linearly to the horizon's periods; with `span_m` it is scaled so that the longer side of its
+    bounding box has this length, and centred onto the field.
+    """
+
+    fitting_q: ClassVar[float] = 0.2
+    tracks: tuple[str, ...] = ()
+    span_m: float | None = quantity(80.0, "scale to this extent and centre; None: as recorded", above=0, optional=True)
+
+    def __post_init__(self):
+        names = (self.tracks,) if isinstance(self.tracks, (str, Path)) else self.tracks
+        object.__setattr__(self, "tracks", tuple(str(name) for name in names))
+        if not self.tracks:
+            raise ScenarioError("Recorded.tracks = (): must name at least one CSV file with columns t, x, y")
+        super().__post_init__()
+
+    def recorded_tracks(self, scenario) -> np.ndarray:
+        """One of each file."""
+        return np.stack([read_track(path, self.span_m, scenario) for path in self.tracks])

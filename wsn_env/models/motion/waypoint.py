@@ -1,0 +1,51 @@
+"""Random waypoints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from wsn_env.compiled import draws
+from wsn_env.models.motion.base import Motion
+from wsn_env.models.quantity import quantity
+
+
+@dataclass(frozen=True)
+class Waypoint(Motion):
+    """Random waypoint: straight at a constant speed to a uniform point of the field, then to the next."""
+
+    fitting_q: ClassVar[float] = 0.2
+    speed_ms: float = quantity(1.0, "speed", above=0)
+
+    def check(self, scenario) -> None:
+        """At most a side in a period."""
+        fastest = scenario.field.side_m / scenario.period_s
+        if self.speed_ms > fastest:
+            raise self._limit("speed_ms", f"at most {fastest} m/s, a side of the field in a period")
+
+    @staticmethod
+    def draw(m, stream, course, track):
+        x = course.side_m * draws.uniform(stream, 0)
+        y = course.side_m * draws.uniform(stream, 1)
+        goal_x = course.side_m * draws.uniform(stream, 2)
+        goal_y = course.side_m * draws.uniform(stream, 3)
+        draw = 4
+        for k in range(len(track)):
+            if k > 0:
+                left = m.speed_ms * course.period_s
+                while True:
+                    distance = np.sqrt((goal_x - x) ** 2 + (goal_y - y) ** 2)
+                    if distance > left:
+                        x += (goal_x - x) * left / distance
+                        y += (goal_y - y) * left / distance
+                        break
+                    left -= distance
+                    x, y = goal_x, goal_y
+                    goal_x = course.side_m * draws.uniform(stream, draw)
+                    goal_y = course.side_m * draws.uniform(stream, draw + 1)
+                    draw += 2
+            distance = np.sqrt((goal_x - x) ** 2 + (goal_y - y) ** 2)
+            scale = m.speed_ms / distance if distance > 0.0 else 0.0
+            track[k] = np.array((x, scale * (goal_x - x), y, scale * (goal_y - y)))

@@ -1,0 +1,1 @@
+"""What talking costs, a kind a file."""

@@ -1,0 +1,77 @@
+"""A scenario as kernels see it: one record of plain numbers in SI units, those of each kind in a record of its own."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from weakref import ref
+
+import numpy as np
+
+from wsn_env.compiled.arrays import record
+from wsn_env.models.kinds import constants_type, fill_constants
+from wsn_env.scenario.scenario import Scenario
+
+KINDS = ("measurement", "detection", "radio")
+
+TRACKING = record(
+    [
+        ("q", "f8"),
+        ("walks", "i8"),
+        ("velocity_kept", "f8"),  # of a walker's, from period to period
+        ("velocity_sd", "f8"),
+        ("gate_m", "f8"),  # inf: none
+        ("pooled", "i8"),
+        ("silent_information", "i8"),
+        ("resample_below", "f8"),
+        ("spread_scale", "f8"),  # 0: systematic resampling alone
+        ("redraw", "i8"),
+        ("search", "i8"),
+        ("log_search_miss", "f8"),
+        ("search_gap", "i8"),
+    ]
+)
+
+
+def constants(scenario: Scenario) -> np.ndarray:
+    """The record of a scenario, an array of one."""
+    known = _made.get(id(scenario))
+    if known is None or known[0]() is not scenario:
+        forget = partial(_made.pop, id(scenario), None)
+        _made[id(scenario)] = known = ref(scenario, lambda _: forget()), _constants(scenario)
+    return known[1].copy()
+
+
+_made: dict[int, tuple[ref, np.ndarray]] = {}  # by scenario
+
+
+def _constants(scenario: Scenario) -> np.ndarray:
+    t = scenario.tracking
+    types = [(name, constants_type(getattr(scenario, name), scenario)) for name in KINDS]
+    plain = [(name, "f8") for name in ("period_s", "side_m", "depth_m", "radius_m", "reach_m", "ring_m")]
+    made = np.zeros(1, record([*types, ("tracking", TRACKING), *plain]))
+    for name in KINDS:
+        fill_constants(made[name], getattr(scenario, name), scenario)
+    walks = t.velocity_s is not None
+    tracking = dict(
+        q=scenario.filter_q,
+        walks=walks,
+        velocity_kept=1.0 if t.velocity_s is None else math.exp(-scenario.period_s / t.velocity_s),
+        velocity_sd=t.rest_sd_ms,
+        gate_m=math.inf if t.gate_m is None else t.gate_m,
+        pooled=t.fusion == "pooled",
+        silent_information=t.silent_information,
+        resample_below=t.resample_below,
+        spread_scale=t.spread_scale if t.resampling == "spread" else 0.0,
+        redraw=t.redraw_on_handover,
+        search=t.search,
+        log_search_miss=math.log(t.search_miss),
+        search_gap=t.search_gap,
+    )
+    for name, value in tracking.items():
+        made["tracking"][name] = value
+    side_m, depth_m = scenario.field.room_m
+    lengths = (scenario.period_s, side_m, depth_m, scenario.radius_m, scenario.reach_m, scenario.ring_m)
+    for (name, _), value in zip(plain, lengths):
+        made[name] = value
+    return made
