@@ -137,11 +137,11 @@ def run_evaluate(command: Evaluate) -> None:
     """`wsn evaluate`."""
     from wsn_env.evaluation.comparison import evaluate
     from wsn_env.evaluation.front import check_front_libraries, lam_sweep
-    from wsn_env.evaluation.kept_blocks import forget_blocks
+    from wsn_env.evaluation.kept_blocks import remove_kept_blocks
     from wsn_env.evaluation.policies import named_policies
     from wsn_env.evaluation.ray_engine import on_ray
-    from wsn_env.reports.front import FRONT_FILES, report_front
-    from wsn_env.reports.pages.report_page import write_report
+    from wsn_env.reports.front_tables import FRONT_FILES, print_and_save_fronts
+    from wsn_env.reports.pages.evaluation_page import write_report
     from wsn_env.reports.pictures import can_draw
     from wsn_env.reports.tables import print_tables, save_markdown
 
@@ -168,7 +168,7 @@ def run_evaluate(command: Evaluate) -> None:
             engine=on_ray(command.address) if command.engine == "ray" else None,
         )
     if command.pareto:
-        report_front(evaluation, command.out)
+        print_and_save_fronts(evaluation, command.out)
     else:
         print_tables(evaluation)
     if command.out:
@@ -178,21 +178,22 @@ def run_evaluate(command: Evaluate) -> None:
         if can_draw():
             with progress_bar() as report:
                 names.append(write_report(command.out, evaluation, policies, progress=report).name)
-        forget_blocks(command.out)
+        remove_kept_blocks(command.out)
         print(f"written: {', '.join(str(command.out / name) for name in names)}")
 
 
 def run_evaluate_recorded(command: Evaluate) -> None:
     """`wsn evaluate --scenario Ble-v0 --tracks FOLDER`."""
-    from wsn_env.bluetooth import recorded_evaluation
+    from wsn_env.bluetooth.recorded_evaluation import evaluate_recorded, remove_recorded_blocks
     from wsn_env.evaluation.ray_engine import on_ray
-    from wsn_env.reports.pages.recorded_report import write_recorded_report
+    from wsn_env.reports.pages.recorded_page import write_recorded_report
     from wsn_env.reports.pictures import can_draw
+    from wsn_env.reports.recorded_tables import print_recorded_tables, save_recorded
 
     if command.pareto or len(command.tracks) != 1:
         raise ValueError("--tracks: must be one folder with tetam.dev and *.mbd, without --pareto")
     with progress_bar() as report:
-        evaluation = recorded_evaluation.evaluate_recorded(
+        evaluation = evaluate_recorded(
             command.policies,
             make_scenario(command.scenario, command.set, []),
             command.tracks[0],
@@ -204,13 +205,13 @@ def run_evaluate_recorded(command: Evaluate) -> None:
             engine=on_ray(command.address) if command.engine == "ray" else None,
             calibrated=any(pair.startswith("calibration=") for pair in command.set),
         )
-    recorded_evaluation.print_recorded(evaluation)
+    print_recorded_tables(evaluation)
     if command.out:
-        names = recorded_evaluation.save_recorded(evaluation, command.out)
+        names = save_recorded(evaluation, command.out)
         if can_draw():
             with progress_bar() as report:
                 names.append(write_recorded_report(command.out, evaluation, command.policies, report).name)
-        recorded_evaluation.forget_recorded_blocks(evaluation, command.out)
+        remove_recorded_blocks(evaluation, command.out)
         print(f"written: {', '.join(str(command.out / name) for name in names)}")
 
 
@@ -233,9 +234,19 @@ def run_replay(command: Replay) -> None:
 
 def run_calibrate(command: Calibrate) -> None:
     """`wsn calibrate`."""
-    from wsn_env.bluetooth.calibration_report import run_calibrate
+    from wsn_env.bluetooth.calibration_files import calibrate_with_and_without, save_calibrations
+    from wsn_env.models.recordings.dataset import read_dataset
+    from wsn_env.reports.calibration_tables import CALIBRATION_FILES, print_calibration, save_calibration_report
+    from wsn_env.reports.tables import wide_console
 
-    run_calibrate(command.tracks, command.out, command.leave_out, command.maps)
+    tracks = read_dataset(command.tracks)
+    whole, parts = calibrate_with_and_without(tracks, command.leave_out)
+    shown = [whole, *(part for part in parts if command.leave_out in (None, part.left_out))]
+    names = save_calibrations(tracks, shown, command.out, command.maps)
+    save_calibration_report(tracks, whole, parts, command.out)
+    print_calibration(whole, parts)
+    written = f"{command.out}: {', '.join([*names, *CALIBRATION_FILES])}"
+    wide_console().print(written, markup=False, highlight=False)
 
 
 def run_reproduce(command: Reproduce) -> None:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from wsn_env.bluetooth.calibration import Calibration, CalibrationError, gather, residuals
+from wsn_env.bluetooth.calibration import Calibration, CalibrationError
+from wsn_env.bluetooth.packets import concatenate_tracks, residuals
 from wsn_env.evaluation.files import replacing
 from wsn_env.models.recordings.replay import CELL_M
 
@@ -36,7 +37,7 @@ def residual_map(tracks: Sequence[Track], calibration: Calibration) -> np.ndarra
     if missing:
         raise CalibrationError(f"tracks: {', '.join(missing)} is missing, which the calibration was made of")
     chosen = [known[name] for name in calibration.tracks]
-    packets = gather(chosen)
+    packets = concatenate_tracks(chosen)
     residual = residuals(packets, calibration)
     nx, ny = (ceil(limit / CELL_M) for limit in chosen[0].receivers.limits_m)
     centres = np.stack(np.meshgrid(np.arange(nx), np.arange(ny), indexing="ij"), axis=-1).reshape(-1, 2)

@@ -18,8 +18,8 @@ class SB3VecEnv(VecEnv):
     empty.
 
     Args:
-        envs: a ClusterVectorEnv or a Fleet, wrapped or not, in same-step or disabled autoreset mode. Next-step's extra
-            reset row is no transition: it is refused.
+        envs: a ClusterVectorEnv or a ConcatVectorEnv, wrapped or not, in same-step or disabled autoreset mode.
+            Next-step's extra reset row is no transition: it is refused.
         stagger: let the rows' first episodes end early, evenly spread, as truncations: later resets stay spread.
             Disabled mode only.
     """

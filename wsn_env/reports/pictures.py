@@ -17,7 +17,7 @@ def can_draw() -> bool:
     return find_spec("matplotlib") is not None
 
 
-def plain(text: str) -> str:
+def escape_label(text: str) -> str:
     """A label that matplotlib shows as it is: dollars begin no formula, an underscore at the start hides nothing."""
     return (" " if text.startswith("_") else "") + text.replace("$", r"\$")
 
@@ -28,7 +28,7 @@ def write_picture(path: str | Path, figure, dpi: int = 140) -> None:
         figure.savefig(temporary, format="png", dpi=dpi)
 
 
-def picture_address(figure) -> str:
+def svg_data_url(figure) -> str:
     """A figure as an SVG inside its own address, for the src of an image; the same figure gives the same text."""
     from matplotlib import rc_context
 

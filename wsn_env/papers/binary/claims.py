@@ -22,7 +22,7 @@ from wsn_env.papers.binary.readings import (
     take_snapshots,
 )
 from wsn_env.papers.binary.systems import FLIP, NODES, PERIODS_S, RADII_M, Results, Setting
-from wsn_env.papers.report import HOLDS, NOT_REPRODUCED, Claim, Expectation, verdict
+from wsn_env.papers.claim import HOLDS, NOT_REPRODUCED, Claim, Expectation, verdict
 from wsn_env.papers.rollout import exceeds, keeps_falling, pooled_rms, standard_error
 
 DOUBT = 4.0  # standard errors that a figure of a sweep may be off

@@ -10,7 +10,7 @@ from wsn_env.envs.rendering.colours import BLACK, BLUE, GREEN, GREY, PURPLE, VER
 from wsn_env.papers.binary.claims import Study
 from wsn_env.papers.binary.readings import boundary_nodes, detecting_nodes
 from wsn_env.papers.binary.systems import FAULTS, NODES, PERIODS_S, RADII_M, SWEPT, SYSTEMS, Results, Setting
-from wsn_env.papers.report import Sheet, by_period, new_axes, write_sheet
+from wsn_env.papers.sheet import Sheet, by_period, new_axes, write_sheet
 from wsn_env.reports.pictures import write_picture
 
 LOOKS = {

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from wsn_env.papers.claim import Claim, Expectation, verdict
 from wsn_env.papers.grnn.systems import ANCHORS, FILTERS, METHODS, PERIODS_S, Results
-from wsn_env.papers.report import Claim, Expectation, verdict
 from wsn_env.papers.rollout import Record, exceeds
 
 EXPECTED_RMSE_M = {  # from an independent implementation of our reading, at T = .1, .2, .5, 1 s

@@ -8,7 +8,7 @@ import numpy as np
 
 from wsn_env.envs.rendering.colours import BLACK, BLUE, GREEN, GREY, PURPLE, SKY, VERMILION
 from wsn_env.papers.grnn.systems import ANCHORS, EQUAL_INFORMATION, METHODS, PERIODS_S, STARTED, Results
-from wsn_env.papers.report import Sheet, new_axes, write_sheet
+from wsn_env.papers.sheet import Sheet, new_axes, write_sheet
 from wsn_env.reports.pictures import write_picture
 
 LOOKS = {

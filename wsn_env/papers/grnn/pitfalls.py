@@ -14,7 +14,7 @@ from wsn_env.filters.kalman import constant_velocity
 from wsn_env.models.physics.field import fixed_positions
 from wsn_env.models.physics.sensing import expected_strengths
 from wsn_env.papers.grnn.systems import NOISE_DB, scenario_as_read, track
-from wsn_env.papers.report import Sheet
+from wsn_env.papers.sheet import Sheet
 
 PERIOD_S, SEED = 1.0, 7
 TRUTH_COV = np.diag([0.25, 0.02, 0.04, 0.01])  # what such programs believe of x, vx, y, vy after the reset

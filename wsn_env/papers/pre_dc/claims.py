@@ -12,8 +12,8 @@ import numpy as np
 
 from wsn_env.models.physics.sensing import detection_probability, joint_detection_probability
 from wsn_env.models.sections import Detection
+from wsn_env.papers.claim import Claim, Expectation, verdict
 from wsn_env.papers.pre_dc.systems import MOTIONS, NODES, PARTICLES, Results
-from wsn_env.papers.report import Claim, Expectation, verdict
 from wsn_env.papers.rollout import Record, exceeds, keeps_falling
 
 STABLE = 1.25  # the error is stable while no later quarter of a run exceeds the first by this factor

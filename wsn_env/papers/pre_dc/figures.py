@@ -10,8 +10,8 @@ from wsn_env.envs.rendering.colours import BLACK, BLUE, DARK, GREEN, GREY, VERMI
 from wsn_env.models.physics.sensing import detection_probability
 from wsn_env.models.sections import Detection
 from wsn_env.papers.pre_dc.systems import MOTIONS, PARTICLES, SYSTEMS, Results
-from wsn_env.papers.report import Sheet, by_period, new_axes, tidy, write_sheet
 from wsn_env.papers.rollout import standard_error
+from wsn_env.papers.sheet import Sheet, by_period, new_axes, tidy, write_sheet
 from wsn_env.reports.pictures import write_picture
 
 STATIC, EKF, PRE_DC = VERMILION, BLUE, BLACK

@@ -12,7 +12,7 @@ from math import sqrt
 import numpy as np
 
 from wsn_env.models.physics.acoustics import absorption_db_per_km
-from wsn_env.papers.report import Claim, Expectation, verdict
+from wsn_env.papers.claim import Claim, Expectation, verdict
 from wsn_env.papers.rollout import Record, exceeds, standard_error
 from wsn_env.papers.underwater.systems import (
     HYSTERESES_DB,

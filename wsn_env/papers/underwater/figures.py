@@ -8,8 +8,8 @@ import numpy as np
 
 from wsn_env.envs.rendering.colours import BLUE, GREEN, GREY, PURPLE, SKY, VERMILION, YELLOW
 from wsn_env.models.physics.acoustics import absorption_db_per_km, ambient_noise_db
-from wsn_env.papers.report import Sheet, by_period, new_axes, write_sheet
 from wsn_env.papers.rollout import Record
+from wsn_env.papers.sheet import Sheet, by_period, new_axes, write_sheet
 from wsn_env.papers.underwater.claims import energy_j
 from wsn_env.papers.underwater.systems import (
     HANDOVERS,

@@ -8,20 +8,20 @@ import re
 from collections.abc import Sequence
 from importlib.resources import files
 
-from wsn_env.reports.pictures import picture_address
+from wsn_env.reports.pictures import svg_data_url
 
 
-def template(name: str) -> str:
+def read_template(name: str) -> str:
     """The text of a file of `templates/`."""
     return (files("wsn_env.reports.pages") / "templates" / name).read_text(encoding="utf-8")
 
 
-def filled(name: str, **parts: str) -> str:
+def fill_template(name: str, **parts: str) -> str:
     """A template, each {{part}} replaced by its HTML. What is put in is not looked at again."""
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], template(name))
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], read_template(name))
 
 
-def whole_page(kind: str, title: str, body: str) -> str:
+def build_page(kind: str, title: str, body: str) -> str:
     """A page with our style.
 
     Args:
@@ -29,10 +29,10 @@ def whole_page(kind: str, title: str, body: str) -> str:
         title: plain text.
         body: HTML.
     """
-    return filled("page.html", kind=kind, title=html.escape(title), style=template("style.css"), body=body)
+    return fill_template("page.html", kind=kind, title=html.escape(title), style=read_template("style.css"), body=body)
 
 
-def script_safe(data) -> str:
+def json_for_script(data) -> str:
     """JSON that cannot end the script element that it stands in."""
     return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
@@ -56,7 +56,7 @@ def table(rows: Sequence[Sequence[str]], strong: str | None = None) -> str:
     return f'<div class="wide"><table{kind}>{"".join(lines)}</table></div>'
 
 
-def folded(title: str, *parts: str, open: bool = False) -> str:
+def collapsible(title: str, *parts: str, open: bool = False) -> str:
     """What opens at a click."""
     return f"<details{' open' if open else ''}><summary>{html.escape(title)}</summary>{''.join(parts)}</details>"
 
@@ -68,4 +68,4 @@ def values_table(values: dict) -> str:
 
 def image(figure, words: str) -> str:
     """A matplotlib figure, and what it shows in words."""
-    return f'<img alt="{html.escape(words)}" src="{picture_address(figure)}">'
+    return f'<img alt="{html.escape(words)}" src="{svg_data_url(figure)}">'

@@ -14,7 +14,7 @@ from wsn_env.evaluation.rollout import episodes, evaluation_seeds
 from wsn_env.reports.pages.page import image, section
 from wsn_env.reports.pages.recording import record
 from wsn_env.reports.pages.replay_page import player
-from wsn_env.reports.pictures import plain
+from wsn_env.reports.pictures import escape_label
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.world import World
 
@@ -80,9 +80,9 @@ def _draw_histograms(played: dict):
     edges, sizes = np.linspace(0.0, most, 41), np.arange(int(largest) + 3) - 0.5
     for (name, (errors, awake)), colour in zip(played.items(), LINES):
         share = np.histogram(np.minimum(errors, most), edges)[0] / len(errors)
-        left.stairs(100 * share, edges, color=colour, label=plain(name), linewidth=1.5)
+        left.stairs(100 * share, edges, color=colour, label=escape_label(name), linewidth=1.5)
         share = np.histogram(np.minimum(awake, sizes[-2] + 0.5), sizes)[0] / len(awake)
-        right.stairs(100 * share, sizes, color=colour, label=plain(name), linewidth=1.5)
+        right.stairs(100 * share, sizes, color=colour, label=escape_label(name), linewidth=1.5)
     left.set(xlabel="error [m]; last: and more", ylabel="periods [%]")
     right.set(xlabel="nodes awake; last: and more", ylabel="periods [%]")
     right.xaxis.get_major_locator().set_params(integer=True)

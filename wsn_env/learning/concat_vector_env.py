@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.vector.utils import batch_space
 
 
-class Fleet(gym.vector.VectorEnv):
+class ConcatVectorEnv(gym.vector.VectorEnv):
     """The rows of its parts, one after the other; seeds go to rows, as those of a single vector environment would.
 
     Args:
@@ -21,9 +21,11 @@ class Fleet(gym.vector.VectorEnv):
         for part in parts:
             for name in ("single_observation_space", "single_action_space"):
                 if getattr(part, name) != getattr(first, name):
-                    raise ValueError(f"Fleet: {name} {getattr(part, name)} differs from {getattr(first, name)}")
+                    raise ValueError(
+                        f"ConcatVectorEnv: {name} {getattr(part, name)} differs from {getattr(first, name)}"
+                    )
             if part.unwrapped.autoreset_mode != first.unwrapped.autoreset_mode:
-                raise ValueError("Fleet: the parts' autoreset modes differ")
+                raise ValueError("ConcatVectorEnv: the parts' autoreset modes differ")
         self.parts = list(parts)
         ends = np.cumsum([0] + [part.num_envs for part in parts])
         self._rows = [slice(start, stop) for start, stop in zip(ends, ends[1:])]

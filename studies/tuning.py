@@ -1,4 +1,4 @@
-"""python -m wsn_env.learning.tuning: find the hand-written rules' parameters anew, on episodes that no comparison uses.
+"""python -m studies.tuning: find the hand-written rules' parameters anew, on episodes that no comparison uses.
 
 Name the lams that suit a scenario: `--scenario Binary-v0 --lams 0.833 1.67 3.33 6.67 13.3 26.7`. Distances are tried
 as shares of the sensing radius. What is best for each lam goes to agents/tuned.json. Every policy that is tried plays
@@ -14,11 +14,11 @@ from pathlib import Path
 
 import numpy as np
 import tyro
-
 from wsn_env.agents.adaptive import RULES, Adaptive, Switch
 from wsn_env.agents.greedy import Greedy, Terms
 from wsn_env.agents.nearest import ORDERS, Nearest
 from wsn_env.agents.tuned import TABLE
+
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.policies import Policy
 from wsn_env.evaluation.progress import Progress, progress_bar

@@ -1,4 +1,4 @@
-"""What every reproduction leaves: claims.csv, expected.csv, tables and pictures, and a summary on the terminal.
+"""Tables and pictures of a reproduction: CSV files, the terminal, axes.
 
 Files are written under a temporary name and then renamed, so that a reader never meets half a file.
 """
@@ -19,35 +19,6 @@ from wsn_env.evaluation.files import replacing
 from wsn_env.reports.pictures import NEEDED, can_draw
 from wsn_env.reports.tables import wide_console
 
-HOLDS = "holds"
-UNDER_READING = "holds under a stated reading"
-NOT_REPRODUCED = "not reproduced"
-COLOURS = {HOLDS: "green", UNDER_READING: "yellow", NOT_REPRODUCED: "red"}
-
-
-@dataclass(frozen=True)
-class Claim:
-    """A claim of the paper beside what we measured."""
-
-    claim: str
-    paper: str
-    ours: str
-    verdict: str
-
-
-@dataclass(frozen=True)
-class Expectation:
-    """A figure known beforehand, with the absolute tolerance that it must be met with."""
-
-    quantity: str
-    expected: float
-    tolerance: float
-    measured: float
-
-    @property
-    def within(self) -> bool:
-        return bool(abs(self.measured - self.expected) <= self.tolerance)
-
 
 @dataclass(frozen=True)
 class Sheet:
@@ -62,19 +33,7 @@ def by_period(names: Iterable[str], columns: Iterable[Sequence[float]], clock: s
     return Sheet((clock, *names), [(k + 1, *values) for k, values in enumerate(zip(*columns, strict=True))])
 
 
-def verdict(plainly: bool, under_reading: bool) -> str:
-    """Judge a claim.
-
-    Args:
-        plainly: it holds even without the reading that favours it.
-        under_reading: it holds in the reading that the paper's module states.
-    """
-    if not under_reading:
-        return NOT_REPRODUCED
-    return HOLDS if plainly else UNDER_READING
-
-
-def prepare(out: Path) -> None:
+def prepare_folder(out: Path) -> None:
     """Make the folder, and see that pictures can be drawn, before time is spent.
 
     Raises:
@@ -96,27 +55,6 @@ def write_sheet(path: Path, sheet: Sheet) -> None:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(sheet.columns)
         table.writerows([_cell(value) for value in row] for row in sheet.rows)
-
-
-def conclude(out: Path, claims: Sequence[Claim], expected: Sequence[Expectation]) -> None:
-    """Write claims.csv and expected.csv to the folder and print both, after all else."""
-    write_claims(out / "claims.csv", claims)
-    write_expected(out / "expected.csv", expected)
-    print_claims(claims)
-    print_expected(expected)
-    print(f"written: {out}")
-
-
-def write_claims(path: Path, claims: Iterable[Claim]) -> None:
-    """claims.csv: claim, paper, ours, verdict."""
-    rows = [(c.claim, c.paper, c.ours, c.verdict) for c in claims]
-    write_sheet(path, Sheet(("claim", "paper", "ours", "verdict"), rows))
-
-
-def write_expected(path: Path, expected: Iterable[Expectation]) -> None:
-    """expected.csv: quantity, expected, tolerance, measured, within."""
-    rows = [(e.quantity, e.expected, e.tolerance, e.measured, e.within) for e in expected]
-    write_sheet(path, Sheet(("quantity", "expected", "tolerance", "measured", "within"), rows))
 
 
 def new_axes(title: str, x: str, y: str):
@@ -156,22 +94,3 @@ def print_sheet(title: str, sheet: Sheet, caption: str | None = None) -> None:
     """A sheet on the terminal, numbers with four digits."""
     rows = [["-" if v is None else f"{v:.4g}" if isinstance(v, float) else str(v) for v in row] for row in sheet.rows]
     print_table(title, sheet.columns, rows, caption)
-
-
-def print_claims(claims: Iterable[Claim]) -> None:
-    """The claims with their verdicts in colour."""
-    table = Table(title="Claims", title_justify="left", show_lines=True)
-    for column in ("claim", "paper", "ours", "verdict"):
-        table.add_column(column)
-    for c in claims:
-        table.add_row(escape(c.claim), escape(c.paper), escape(c.ours), f"[{COLOURS[c.verdict]}]{c.verdict}[/]")
-    wide_console().print(table)
-
-
-def print_expected(expected: Sequence[Expectation]) -> None:
-    """How many expected figures were met, and each that was not."""
-    missed = [e for e in expected if not e.within]
-    wide_console().print(f"Expected figures: {len(expected) - len(missed)} of {len(expected)} within their tolerance.")
-    for e in missed:
-        text = f"  missed: {e.quantity}: {e.measured:.4g}, expected {e.expected:.4g} +- {e.tolerance:.2g}"
-        wide_console().print(escape(text))
