@@ -11,6 +11,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import tyro
@@ -67,9 +68,9 @@ class Trials:
             what: for the progress bar.
             played_at: the lam that each policy sees, whatever it is compared at; None: the first.
         """
-        seen = [self.lams[0]] * len(policies) if played_at is None else played_at
+        played_lams = [self.lams[0]] * len(policies) if played_at is None else played_at
         rows = []
-        for done, (policy, lam) in enumerate(zip(policies, seen, strict=True)):
+        for done, (policy, lam) in enumerate(zip(policies, played_lams, strict=True)):
             rows.append(self._play(policy, float(lam)))
             self._progress(done + 1, len(policies), f"{self.scenario.name}, {what}")
         return np.array(rows)
@@ -85,9 +86,9 @@ class Trials:
         return self._costs[key]
 
 
-def tune(trials: Trials) -> dict:
+def tune(trials: Trials) -> dict[str, Any]:
     """What the table says of a scenario."""
-    found: dict = {}
+    found: dict[str, Any] = {}
     for order in ORDERS:
         found[order] = tune_fixed(trials, order)
         found[RULES[order]] = tune_adaptive(trials, order, found[order])

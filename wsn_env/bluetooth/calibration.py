@@ -17,6 +17,7 @@ import json
 from dataclasses import dataclass
 from math import sqrt
 from pathlib import Path
+from typing import Any
 
 from wsn_env.evaluation.files import replacing
 from wsn_env.models.quantity import ScenarioError, check_quantity, suggest
@@ -24,13 +25,13 @@ from wsn_env.models.quantity import ScenarioError, check_quantity, suggest
 KIND, VERSION = "wsn_env calibration", 1
 
 # What a scenario takes: each quantity's meaning and bounds; lists hold one figure a receiver.
-LISTS = {
+LISTS: dict[str, tuple[str, dict[str, float]]] = {
     "positions": ("x and y of the receivers [m]", {}),
     "heights_m": ("heights of the receivers [m]", {}),
     "at_1m_db": ("level at 1 m (P0) [dBm]", {}),
     "exponents": ("path loss exponents (n)", dict(above=0)),
 }
-NUMBERS = {
+NUMBERS: dict[str, tuple[str, dict[str, float]]] = {
     "side_m": ("width of the room, along x", dict(above=0)),
     "depth_m": ("depth of the room, along y", dict(above=0)),
     "beacon_m": ("mean height of the beacon", {}),
@@ -69,9 +70,9 @@ class Calibration:
 
     tracks: tuple[str, ...]
     left_out: str | None
-    quantities: dict
-    found: dict
-    versions: dict
+    quantities: dict[str, Any]
+    found: dict[str, Any]
+    versions: dict[str, str]
 
     @property
     def bias_db(self) -> float:
@@ -109,7 +110,7 @@ class Calibration:
         return cls(tuple(content["tracks"]), **{name: content[name] for name in names})
 
 
-def _check(content) -> None:
+def _check(content: Any) -> None:
     """Raise unless a file's content is a calibration."""
     if not isinstance(content, dict) or content.get("kind") != KIND:
         kind = content.get("kind") if isinstance(content, dict) else content
@@ -128,7 +129,7 @@ def _check(content) -> None:
     _check_quantities(content["quantities"])
 
 
-def _check_quantities(quantities: dict) -> None:
+def _check_quantities(quantities: dict[str, Any]) -> None:
     for name in quantities:
         if name not in QUANTITIES:
             raise CalibrationError(f"quantities.{name} = {quantities[name]!r}: unknown; {suggest(name, QUANTITIES)}")

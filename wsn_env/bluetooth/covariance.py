@@ -81,7 +81,7 @@ def autocovariance(packets: Packets, residual: np.ndarray) -> Autocovariance:
     return Autocovariance(seconds, metres, products, pairs.astype(int))
 
 
-def fit_bias(cells: Autocovariance) -> dict:
+def fit_bias(cells: Autocovariance) -> dict[str, float]:
     """Part what neighbouring packets share into field and drift, by least squares over the cells.
 
         c(dt, dx) = field_db2 exp(-dx / field_m) + drift_db2 exp(-dt / drift_s) - taken_db2
@@ -97,7 +97,7 @@ def fit_bias(cells: Autocovariance) -> dict:
     lag_s, lag_m, covariance = cells.lag_s[counts], cells.lag_m[counts], cells.covariance[counts]
     weight = np.sqrt(np.minimum(cells.pairs[counts], MOST_PAIRS))
 
-    def misfit(point):
+    def misfit(point: np.ndarray) -> np.ndarray:
         return weight * (bias_covariance(lag_s, lag_m, *point) - covariance)
 
     scale = max(covariance.max(), LEAST_BIAS)
@@ -107,7 +107,15 @@ def fit_bias(cells: Autocovariance) -> dict:
     return dict(zip(("field_db2", "field_m", "drift_db2", "drift_s", "taken_db2"), best.x.tolist()))
 
 
-def bias_covariance(lag_s, lag_m, field_db2, field_m, drift_db2, drift_s, taken_db2):
+def bias_covariance(
+    lag_s: np.ndarray,
+    lag_m: np.ndarray,
+    field_db2: float,
+    field_m: float,
+    drift_db2: float,
+    drift_s: float,
+    taken_db2: float,
+) -> np.ndarray:
     """Covariance of the residuals of two packets of a receiver; see `fit_bias`.
 
     Args:

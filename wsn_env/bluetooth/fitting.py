@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from math import log, sqrt
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.optimize import minimize
@@ -22,7 +22,7 @@ from wsn_env.bluetooth.losses import measure_losses
 from wsn_env.bluetooth.packets import Packets, concatenate_tracks
 
 if TYPE_CHECKING:
-    from wsn_env.models.recordings.dataset import Track
+    from wsn_env.models.recordings.dataset import Receivers, Track
 
 EXPONENT_SD = 0.3  # of a receiver's exponent about the common one, before the receiver is heard
 EXPONENT_NOISE_DB = 5.3 * sqrt(8)  # sd of a level for this purpose: eight neighbouring packets tell as much as one
@@ -98,8 +98,8 @@ def calibrate(tracks: Sequence[Track]) -> Calibration:
     }
     made_by = {"python": platform.python_version()} | {name: version(name) for name in ("wsn_env", "numpy", "scipy")}
     names = tuple(track.name for track in tracks)
-    ordered = {name: _plain(quantities[name]) for name in QUANTITIES}
-    return Calibration(names, None, ordered, {name: _plain(value) for name, value in found.items()}, made_by)
+    ordered = {name: _json_value(quantities[name]) for name in QUANTITIES}
+    return Calibration(names, None, ordered, {name: _json_value(value) for name, value in found.items()}, made_by)
 
 
 def leave_one_out(tracks: Sequence[Track]) -> list[Calibration]:
@@ -138,7 +138,7 @@ def fit_path_loss(packets: Packets, names: Sequence[str]) -> tuple[np.ndarray, n
     return z_mean - exponents * x_mean, exponents
 
 
-def fit_mixture(residual: np.ndarray, bias: float, white: float) -> dict:
+def fit_mixture(residual: np.ndarray, bias: float, white: float) -> dict[str, float]:
     """The white part as two normal components with mean zero and variance `white` over both, by maximum likelihood.
 
         (1 - w) N(w g, s^2) + w N(-(1 - w) g, r s^2),   w (1 - w) g^2 = b white,   (1 - w + w r) s^2 = (1 - b) white
@@ -149,13 +149,13 @@ def fit_mixture(residual: np.ndarray, bias: float, white: float) -> dict:
     """
     values, counts = np.unique(np.round(residual, 1), return_counts=True)
 
-    def parts(point):
+    def parts(point: np.ndarray) -> tuple[float, float, float, float, float]:
         share, between, ratio = point[0], point[1], np.exp(point[2])
         gap = np.sqrt(between * white / (share * (1 - share)))
         narrow = (1 - between) * white / (1 - share + share * ratio)
         return share, share * gap, narrow, -(1 - share) * gap, narrow * ratio
 
-    def surprise(point):
+    def negative_log_likelihood(point: np.ndarray) -> float:
         share, main, narrow, fade, wide = parts(point)
         density = (1 - share) * normal_density(values, main, narrow + bias)
         density += share * normal_density(values, fade, wide + bias)
@@ -164,7 +164,10 @@ def fit_mixture(residual: np.ndarray, bias: float, white: float) -> dict:
     bounds = [(0.02, 0.98), (0, 0.95), (-3, 3)]
     starts = (0.2, 0.5, 1), (0.4, 0.3, 0.5), (0.5, 0.1, 0.1)
     options = {"xatol": 1e-5, "fatol": 1e-11, "maxfev": 2000}
-    found = (minimize(surprise, start, bounds=bounds, method="Nelder-Mead", options=options) for start in starts)
+    found = (
+        minimize(negative_log_likelihood, start, bounds=bounds, method="Nelder-Mead", options=options)
+        for start in starts
+    )
     share, main, narrow, fade, wide = parts(min(found, key=lambda result: result.fun).x)
     return {
         "main_db": main,
@@ -175,23 +178,23 @@ def fit_mixture(residual: np.ndarray, bias: float, white: float) -> dict:
     }
 
 
-def normal_density(x, mean, variance):
+def normal_density(x: np.ndarray, mean: float, variance: float) -> np.ndarray:
     """Density of the normal distribution."""
     return np.exp(-0.5 * (x - mean) ** 2 / variance) / np.sqrt(2 * np.pi * variance)
 
 
-def _plain(value):
+def _json_value(value: Any) -> Any:
     """Numbers and lists of them, as JSON has them; rounded, so that files of the same data are the same."""
     if isinstance(value, dict):
-        return {name: _plain(item) for name, item in value.items()}
+        return {name: _json_value(item) for name, item in value.items()}
     if isinstance(value, list | np.ndarray):
-        return [_plain(item) for item in value]
+        return [_json_value(item) for item in value]
     if isinstance(value, str):
         return value
     return int(value) if isinstance(value, int | np.integer) else round(float(value), DECIMALS) + 0.0
 
 
-def _shared_receivers(tracks: Sequence[Track]):
+def _shared_receivers(tracks: Sequence[Track]) -> Receivers:
     """The receivers of all tracks, which have to be the same."""
     if not tracks:
         raise CalibrationError("tracks = []: at least one is needed")

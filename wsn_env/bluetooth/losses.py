@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ FEWEST_HEARD = 0.25  # of the receivers, or it is no advertisement
 NEXT = 1.5  # intervals at most between two advertisements of which none is missing
 
 
-def measure_losses(tracks: Sequence[Track]) -> dict:
+def measure_losses(tracks: Sequence[Track]) -> dict[str, Any]:
     """Which receivers missed an advertisement, and how far apart advertisements are.
 
     Packets less than 50 ms apart belong to one advertisement; one that is heard by less than a quarter of the receivers

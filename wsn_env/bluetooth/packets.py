@@ -92,8 +92,9 @@ def hold_out(tracks: Sequence[Track], whole: Calibration, parts: Iterable[Calibr
     """Residuals of every track against the calibration without it."""
     packets = concatenate_tracks(tracks)
     residual = residuals(packets, whole)
+    names: list[str | None] = [track.name for track in tracks]
     for part in parts:
-        chosen = packets.track == [track.name for track in tracks].index(part.left_out)
+        chosen = packets.track == names.index(part.left_out)
         residual[chosen] = residuals(packets, part)[chosen]
     return HeldOut(packets, residual)
 

@@ -1,8 +1,8 @@
-"""Comparison on recorded tracks: each is replayed, with a calibration that has not seen it.
+"""Comparison on recorded tracks: each is replayed, with a calibration made without it.
 
-An episode is a track with the draws of one seed, which are those of the filter (and of policies that throw dice): the
-packets are always the recorded ones. Means are taken over the tracks first, so that a long track counts no more than a
-short one; their spread over seeds says how far the filter's luck goes, not how another track would turn out.
+An episode is a track with the draws of one seed, which are those of the filter (and of random policies): the packets
+are always the recorded ones. Means are taken over the tracks first, so that a long track counts no more than a short
+one; their spread over seeds says how much the filter's random numbers matter, not how another track would turn out.
 """
 
 from __future__ import annotations
@@ -112,21 +112,22 @@ def evaluate_recorded(
     Raises:
         ValueError: another scenario, nothing to read, or too few tracks to leave one out.
     """
-    _check_hears(scenario)
+    _beacon_of(scenario)
     paths = {track_name(path): path for path in track_files(folder)}
-    known = {name: scenario for name in paths}
+    scenarios = {name: scenario for name in paths}
     if not calibrated:
         if len(paths) < 2:
             raise ValueError(
                 f"{folder}: holds one track: leaving it out leaves none to calibrate on (give calibration=)"
             )
-        for each in leave_one_out(read_dataset(folder)):
-            known[each.left_out] = scenario.override(**each.quantities)
+        tracks = read_dataset(folder)
+        for track, without in zip(tracks, leave_one_out(tracks)):
+            scenarios[track.name] = scenario.override(**without.quantities)
     evaluations = {}
     for number, (name, path) in enumerate(paths.items()):
         evaluations[name] = evaluate(
             insert_track_name(policies, name),
-            _replay(known[name], name, path),
+            _replay(scenarios[name], name, path),
             lams,
             seeds,
             seed,
@@ -153,7 +154,7 @@ def replay_scenario(scenario: Scenario, path: str | Path, calibrated: bool = Fal
     Raises:
         ValueError: another scenario, or no such track.
     """
-    _check_hears(scenario)
+    _beacon_of(scenario)
     path = Path(path)
     if not path.is_file():
         raise DatasetError(f"{path}: is no file; a recorded track is a *.mbd file")
@@ -163,15 +164,17 @@ def replay_scenario(scenario: Scenario, path: str | Path, calibrated: bool = Fal
     return _replay(scenario, track_name(path), path)
 
 
-def _check_hears(scenario: Scenario) -> None:
+def _beacon_of(scenario: Scenario) -> Beacon:
+    """Its measurement, which must hear a beacon."""
     if not isinstance(scenario.measurement, Beacon):
         raise ScenarioError(
             f"scenario = {scenario.name!r}: has no receivers that hear a beacon; recorded tracks are for Ble-v0"
         )
+    return scenario.measurement
 
 
 def _replay(scenario: Scenario, name: str, path: Path) -> Scenario:
-    maps = scenario.measurement.residual_map
+    maps = _beacon_of(scenario).residual_map
     maps = maps and maps.replace("{track}", name)
     return scenario.override(motion="replay", recording=str(path), residual_map=maps)
 

@@ -80,7 +80,7 @@ def find_fronts(evaluation: Evaluation) -> Fronts:
         stem, number = split_number(policy)
         family = (stem, True) if number and len(points) == 1 else (policy, False)
         families.setdefault(family, []).append((number, points))
-    found = {}
+    found: Fronts = {}
     for (stem, joins), members in families.items():
         if joins:
             members.sort(key=lambda member: int(member[0]))
@@ -141,7 +141,7 @@ def hypervolumes(fronts: Fronts, reference: tuple[float, float]) -> list[Volume]
     values = np.stack([point.values for point in join_points(fronts.values())], axis=1)  # (episodes, points, 2)
     ends = np.cumsum([len(points) for points in fronts.values()])[:-1]
 
-    def measure(episodes) -> list[float]:
+    def measure(episodes: np.ndarray | slice) -> list[float]:
         # A mean over the first axis adds row by row: equal columns give equal bits.
         return [hypervolume(part, reference) for part in np.split(values[episodes].mean(axis=0), ends)]
 

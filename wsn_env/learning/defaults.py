@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from wsn_env.scenario import Scenario
 
 
-def default_order(scenario: Scenario) -> str:
+def default_order(scenario: Scenario) -> Literal["nearest", "information", "value"]:
     """The menu's order of merit: by what the nodes measure."""
     return "value" if scenario.binary else "nearest" if scenario.locates else "information"
 
@@ -21,5 +23,5 @@ def default_node_counts(scenario: Scenario) -> list[int]:
     if scenario.field.positions is not None:
         return []
     fewer = 1 / 3 if default_level(scenario) > 0.0 else 2 / 3
-    wanted = [scenario.field.nodes * share for share in (fewer, 2)]
-    return [round(n**0.5) ** 2 if scenario.field.layout == "grid" else round(n) for n in wanted]
+    counts = [scenario.field.nodes * share for share in (fewer, 2)]
+    return [round(n**0.5) ** 2 if scenario.field.layout == "grid" else round(n) for n in counts]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from rich.markup import escape
 from rich.table import Table
@@ -12,10 +13,11 @@ from rich.table import Table
 from wsn_env.papers.sheet import Sheet, write_sheet
 from wsn_env.reports.tables import wide_console
 
-HOLDS = "holds"
-UNDER_READING = "holds under a stated reading"
-NOT_REPRODUCED = "not reproduced"
-COLOURS = {HOLDS: "green", UNDER_READING: "yellow", NOT_REPRODUCED: "red"}
+Verdict = Literal["holds", "holds under a stated reading", "not reproduced"]
+HOLDS: Verdict = "holds"
+UNDER_READING: Verdict = "holds under a stated reading"
+NOT_REPRODUCED: Verdict = "not reproduced"
+COLOURS: dict[Verdict, str] = {HOLDS: "green", UNDER_READING: "yellow", NOT_REPRODUCED: "red"}
 
 
 @dataclass(frozen=True)
@@ -25,12 +27,12 @@ class Claim:
     claim: str
     paper: str
     ours: str
-    verdict: str
+    verdict: Verdict
 
 
 @dataclass(frozen=True)
 class Expectation:
-    """A figure known beforehand, with the absolute tolerance that it must be met with."""
+    """An expected figure, with the absolute tolerance that it must be met with."""
 
     quantity: str
     expected: float
@@ -42,7 +44,7 @@ class Expectation:
         return bool(abs(self.measured - self.expected) <= self.tolerance)
 
 
-def verdict(plainly: bool, under_reading: bool) -> str:
+def verdict(plainly: bool, under_reading: bool) -> Verdict:
     """Judge a claim.
 
     Args:

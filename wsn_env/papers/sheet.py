@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
 from rich.table import Table
@@ -19,16 +19,20 @@ from wsn_env.evaluation.files import replacing
 from wsn_env.reports.pictures import NEEDED, can_draw
 from wsn_env.reports.tables import wide_console
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 
 @dataclass(frozen=True)
 class Sheet:
     """A table for a CSV file."""
 
     columns: tuple[str, ...]
-    rows: list[Sequence[Any]]
+    rows: Sequence[Sequence[Any]]
 
 
-def by_period(names: Iterable[str], columns: Iterable[Sequence[float]], clock: str = "period") -> Sheet:
+def by_period(names: Iterable[str], columns: Iterable[Iterable[float]], clock: str = "period") -> Sheet:
     """A table of a row a period, counted from 1 in its first column, `clock`."""
     return Sheet((clock, *names), [(k + 1, *values) for k, values in enumerate(zip(*columns, strict=True))])
 
@@ -57,7 +61,7 @@ def write_sheet(path: Path, sheet: Sheet) -> None:
         table.writerows([_cell(value) for value in row] for row in sheet.rows)
 
 
-def new_axes(title: str, x: str, y: str):
+def new_axes(title: str, x: str, y: str) -> tuple[Figure, Axes]:
     """A matplotlib figure with one pair of axes."""
     from matplotlib.figure import Figure
 
@@ -68,13 +72,13 @@ def new_axes(title: str, x: str, y: str):
     return figure, axes
 
 
-def tidy(axes) -> None:
+def tidy(axes: Axes) -> None:
     """No frame, a faint grid."""
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(alpha=0.25)
 
 
-def _cell(value) -> str:
+def _cell(value: Any) -> str:
     if isinstance(value, (str, bool, int)):
         return str(value)
     return "" if value is None or value != value else f"{value:.6g}"

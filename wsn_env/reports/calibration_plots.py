@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,11 +14,15 @@ from wsn_env.bluetooth.packets import Packets, concatenate_tracks, local_deviati
 from wsn_env.envs.rendering import colours
 from wsn_env.models.recordings.dataset import Track
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
 LINE, POINTS, SECOND, FAINT, BARS = colours.BLUE, colours.VERMILION, colours.GREEN, colours.GREY, colours.FAINT
 COLUMNS = 4  # of the small multiples
 
 
-def draw_calibration(tracks: Sequence[Track], calibration: Calibration):
+def draw_calibration(tracks: Sequence[Track], calibration: Calibration) -> Figure:
     """Figure of what the calibration was fitted to: levels, autocovariance, white part and losses."""
     from matplotlib.figure import Figure
 
@@ -26,7 +31,7 @@ def draw_calibration(tracks: Sequence[Track], calibration: Calibration):
     names = calibration.found["receivers"]
     rows = -(-len(names) // COLUMNS)
     figure = Figure(figsize=(13, 2.1 * rows + 8.2), layout="constrained")
-    upper, lower = figure.subfigures(2, 1, height_ratios=(2.1 * rows + 0.6, 7.6))
+    upper, lower = figure.subfigures(2, 1, height_ratios=(2.1 * rows + 0.6, 7.6), squeeze=False).flat
     _draw_levels(upper, rows, packets, calibration)
     panels = lower.subplots(2, 2)
     cells = autocovariance(packets, residual)
@@ -40,7 +45,7 @@ def draw_calibration(tracks: Sequence[Track], calibration: Calibration):
     return figure
 
 
-def _draw_levels(figure, rows: int, packets: Packets, calibration: Calibration) -> None:
+def _draw_levels(figure: SubFigure, rows: int, packets: Packets, calibration: Calibration) -> None:
     """Level against distance, a panel for every receiver."""
     q, names = calibration.quantities, calibration.found["receivers"]
     panels = figure.subplots(rows, COLUMNS, sharex=True, sharey=True, squeeze=False)
@@ -75,7 +80,7 @@ def _draw_levels(figure, rows: int, packets: Packets, calibration: Calibration) 
     figure.legend(handles, labels, loc="outside upper center", title=title, **style)
 
 
-def _draw_time(axes, cells: Autocovariance, calibration: Calibration) -> None:
+def _draw_time(axes: Axes, cells: Autocovariance, calibration: Calibration) -> None:
     """Autocovariance against the lag in time, over all lags in space."""
     fitted = calibration.found["autocovariance_fit"]
     lag, measured, model = _over(cells, 1, slice(None, -1), fitted)
@@ -94,7 +99,7 @@ def _draw_time(axes, cells: Autocovariance, calibration: Calibration) -> None:
     axes.legend(frameon=False, fontsize=9)
 
 
-def _draw_space(axes, cells: Autocovariance, calibration: Calibration) -> None:
+def _draw_space(axes: Axes, cells: Autocovariance, calibration: Calibration) -> None:
     """Autocovariance against the lag in space, on one track and between tracks."""
     fitted = calibration.found["autocovariance_fit"]
     kinds = (("on one track", slice(None, -1), POINTS, "o"), ("from two tracks", slice(-1, None), LINE, "s"))
@@ -109,7 +114,9 @@ def _draw_space(axes, cells: Autocovariance, calibration: Calibration) -> None:
     axes.legend(frameon=False, fontsize=9, title=text, title_fontsize=9)
 
 
-def _over(cells: Autocovariance, axis: int, part: slice, fitted: dict) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _over(
+    cells: Autocovariance, axis: int, part: slice, fitted: dict[str, float]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mean lag, measured and fitted autocovariance in the cells' rows or columns, weighted by pairs."""
     counts = cells.counts[part]
     pairs = np.where(counts, cells.pairs[part], 0)
@@ -123,14 +130,14 @@ def _over(cells: Autocovariance, axis: int, part: slice, fitted: dict) -> tuple[
     )
 
 
-def _draw_white(axes, deviation: np.ndarray, calibration: Calibration) -> None:
+def _draw_white(axes: Axes, deviation: np.ndarray, calibration: Calibration) -> None:
     """Deviations from the local mean against the mixture, each component widened by the local mean's own error."""
     q = calibration.quantities
     deviation = deviation[np.isfinite(deviation)]
     error = max(deviation.var() - calibration.white_db**2, 0)
     low, high = np.percentile(deviation, [0.05, 99.95])
     edges = np.arange(np.floor(low), np.ceil(high) + 1, 0.5)
-    axes.hist(deviation, edges, density=True, color=BARS, label="measured")
+    axes.hist(deviation, edges.tolist(), density=True, color=BARS, label="measured")
     grid = np.linspace(low, high, 300)
     main = (1 - q["fade_share"]) * normal_density(grid, q["main_db"], q["main_sd_db"] ** 2 + error)
     fade = q["fade_share"] * normal_density(grid, q["fade_db"], q["fade_sd_db"] ** 2 + error)
@@ -144,7 +151,7 @@ def _draw_white(axes, deviation: np.ndarray, calibration: Calibration) -> None:
     axes.legend(frameon=False, fontsize=9)
 
 
-def _draw_losses(axes, calibration: Calibration) -> None:
+def _draw_losses(axes: Axes, calibration: Calibration) -> None:
     """Share of lost packets by receiver with 95 % intervals, over all, and after a loss."""
     q, found = calibration.quantities, calibration.found
     loss = np.array(found["loss_by_receiver"])

@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 from math import pi, sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from wsn_env.envs.rendering.colours import BLUE, DARK, GREEN, GREY, VERMILION
 from wsn_env.evaluation.comparison import Evaluation, stem_of
+from wsn_env.evaluation.intervals import Summary
 from wsn_env.reports.pictures import escape_label
 from wsn_env.simulation.bound import bound_kind
 
-EMPHASIS, FAMILY, OTHER, FLOOR = VERMILION, BLUE, DARK, GREEN
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
+
+EMPHASIS, FAMILY, OTHER, BOUND = VERMILION, BLUE, DARK, GREEN
 NARROW = 3  # energies that span less are drawn on a linear axis
 ROUND = sqrt(pi) / 2  # mean error over RMS of a round Gaussian in the plane
 
 
-def draw_comparison(evaluation: Evaluation, lam: float, emphasis: str | None = None):
+def draw_comparison(evaluation: Evaluation, lam: float, emphasis: str | None = None) -> Figure:
     """Figure of mean error against energy with intervals, and the curve of equal return through one policy.
 
     Policies that differ by a number at the end of their names are joined by a line, and labelled by the number. The
-    floor of all nodes awake is drawn as the mean error of a round Gaussian of its RMS (sqrt(pi) / 2 of it).
+    bound with all nodes awake is drawn as the mean error of a round Gaussian of its RMS (sqrt(pi) / 2 of it).
 
     Args:
         lam: one of the evaluation's.
@@ -63,23 +70,23 @@ def draw_comparison(evaluation: Evaluation, lam: float, emphasis: str | None = N
     return figure
 
 
-def label_decades(axis) -> None:
+def label_decades(axis: Axis) -> None:
     """Numbers in full at 1, 2, 3, 5 and 7 of each decade of a logarithmic axis."""
     axis.set_major_formatter(lambda value, _: f"{value:g}")
     axis.set_minor_formatter(lambda value, _: f"{value:g}" if f"{value:e}"[0] in "2357" else "")
     axis.set_tick_params(which="both", labelsize=9)
 
 
-def draw_bound_line(axes, evaluation: Evaluation) -> None:
-    """A line at the mean error of a round Gaussian of the floor's RMS, if there is a bound."""
-    floor = evaluation.floor_m()
-    if floor is not None:
+def draw_bound_line(axes: Axes, evaluation: Evaluation) -> None:
+    """A line at the mean error of a round Gaussian whose RMS is the bound with all nodes awake, if there is one."""
+    all_awake_m = evaluation.bound_all_awake_m()
+    if all_awake_m is not None:
         kind = {"bound": "floor", "reference": "reference"}[bound_kind(evaluation.scenario)]
-        label = f"{kind}: all nodes, {floor:.3g} m RMS"
-        axes.axhline(ROUND * floor, color=FLOOR, linewidth=1, linestyle=":", label=label)
+        label = f"{kind}: all nodes, {all_awake_m:.3g} m RMS"
+        axes.axhline(ROUND * all_awake_m, color=BOUND, linewidth=1, linestyle=":", label=label)
 
 
-def _draw_point(axes, policy: str, energy, error, strong: bool, numbered: bool) -> None:
+def _draw_point(axes: Axes, policy: str, energy: Summary, error: Summary, strong: bool, numbered: bool) -> None:
     colour = EMPHASIS if strong else FAMILY if numbered else OTHER
     axes.errorbar(
         energy.mean,

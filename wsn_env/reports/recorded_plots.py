@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from wsn_env.bluetooth.recorded_evaluation import RecordedEvaluation
 from wsn_env.envs.rendering.colours import BLUE, DARK, GREEN, ORANGE, PURPLE, SKY, VERMILION, YELLOW
 from wsn_env.evaluation.comparison import stem_of
 from wsn_env.reports.pictures import escape_label
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 FAMILIES = (BLUE, ORANGE, GREEN, PURPLE, SKY, YELLOW)
 
 
-def draw_recorded(evaluation: RecordedEvaluation):
-    """Figure of RMS against energy: families as lines, single policies as points, one for each lam that they see."""
+def draw_recorded(evaluation: RecordedEvaluation) -> Figure:
+    """Figure of RMS against energy: families as lines, single policies as points, one for each lam that matters."""
     from matplotlib.figure import Figure
 
     lams, policies = evaluation.first.lams, evaluation.first.policies
@@ -36,8 +41,9 @@ def draw_recorded(evaluation: RecordedEvaluation):
         )
     for k, policy in enumerate(policies):
         if stem_of(policy) not in stems:
-            points = [[evaluation.mean(policy, each, name) for name in ("energy_mj", "rms_m")] for each in lams]
-            points = sorted(dict.fromkeys(map(tuple, points)))  # one, if it does not look at lam
+            points = sorted(  # one, if it does not look at lam
+                {(evaluation.mean(policy, each, "energy_mj"), evaluation.mean(policy, each, "rms_m")) for each in lams}
+            )
             learned = policy.startswith("ppo")
             style = dict(marker="*", markersize=13, color=VERMILION) if learned else dict(marker="s", color=DARK)
             axes.plot(*zip(*points), linewidth=1.2, zorder=4 if learned else 3, **style)

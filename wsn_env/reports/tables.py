@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from wsn_env.evaluation.comparison import Evaluation
 from wsn_env.evaluation.files import replacing
+from wsn_env.evaluation.intervals import Summary
 from wsn_env.simulation.bound import bound_kind
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 HEADER = ("policy", "return", "{} minus it", "RMS m", "RMS / {}", "energy mJ/period", "awake", "lost")
 
@@ -20,8 +25,8 @@ def table_header(evaluation: Evaluation, reference: str) -> list[str]:
 
 def describe_bound(evaluation: Evaluation) -> str:
     """What the column of the bound holds, in a sentence."""
-    floor = evaluation.floor_m()
-    if floor is None:
+    all_awake_m = evaluation.bound_all_awake_m()
+    if all_awake_m is None:
         if evaluation.scenario.hears:
             return "no Cramer-Rao bound: the errors of a beacon's levels last over periods"
         return "no Cramer-Rao bound: a bit that jumps at an edge has no Fisher information"
@@ -29,7 +34,7 @@ def describe_bound(evaluation: Evaluation) -> str:
         "bound": "posterior Cramer-Rao bound of the reports delivered",
         "reference": "Cramer-Rao recursion of the reports delivered, which can be beaten here: no bound",
     }[bound_kind(evaluation.scenario)]
-    return f"RMS over the {what}; the same for all nodes awake and heard: {floor:.3f} m"
+    return f"RMS over the {what}; the same for all nodes awake and heard: {all_awake_m:.3f} m"
 
 
 def table_rows(evaluation: Evaluation, lam: float, reference: str) -> list[tuple[str, ...]]:
@@ -59,7 +64,7 @@ def table_rows(evaluation: Evaluation, lam: float, reference: str) -> list[tuple
     return [row for _, row in sorted(rows, key=lambda pair: -pair[0])]
 
 
-def format_interval(value, digits: int, sign: str = "") -> str:
+def format_interval(value: Summary, digits: int, sign: str = "") -> str:
     """mean [low, high] of a Summary."""
     return f"{value.mean:{sign}.{digits}f} [{value.low:{sign}.{digits}f}, {value.high:{sign}.{digits}f}]"
 
@@ -70,7 +75,7 @@ def describe_best_in_hindsight(evaluation: Evaluation, lam: float) -> list[str]:
     return [f"best in hindsight: {', '.join(best)}"] if best else []
 
 
-def wide_console():
+def wide_console() -> Console:
     """For the terminal, or as wide as a table wants where the output is a file or a pipe."""
     from rich.console import Console
 
@@ -78,7 +83,7 @@ def wide_console():
     return console if console.is_terminal else Console(width=160)
 
 
-def print_tables(evaluation: Evaluation, reference: str | None = None, console=None) -> None:
+def print_tables(evaluation: Evaluation, reference: str | None = None, console: Console | None = None) -> None:
     """One table for each lam."""
     from rich.table import Table
 

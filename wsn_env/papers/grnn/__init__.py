@@ -78,10 +78,10 @@ def rmse(results: Results) -> Sheet:
     """The main table: root mean square error over all runs and periods, radial and along each axis."""
     rows = []
     for method, expectations in EXPECTED_RMSE_M.items():
-        for period_s, known in zip(PERIODS_S, expectations, strict=True):
+        for period_s, expected_m in zip(PERIODS_S, expectations, strict=True):
             record = results.method(method, period_s)
             along = [record.pooled_rms_m(axis)[0] for axis in (0, 1)]
-            rows.append((method, period_s, known, *record.pooled_rms_m(), *along))
+            rows.append((method, period_s, expected_m, *record.pooled_rms_m(), *along))
     return Sheet(("method", "period_s", "expected_m", "rmse_m", "stderr_m", "rmse_x_m", "rmse_y_m"), rows)
 
 

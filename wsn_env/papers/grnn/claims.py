@@ -33,7 +33,7 @@ ITERATION_SHARE = 0.05  # with a good start iterating changes less
 
 
 def expected(results: Results, widths: dict[str, tuple[float, float, int]]) -> list[Expectation]:
-    """Every figure known beforehand.
+    """Every expected figure.
 
     Args:
         widths: of "golden" and "foa": width [dB], error at the validation points [m], evaluations.

@@ -87,6 +87,6 @@ def _print(table: Sheet, same: Sheet, runs: int) -> None:
         rows.append([str(cells[0][0])] + [f"{p or '-'} / {rms:.3f} ({se:.3f})" for _, _, p, rms, se, _ in cells])
     caption = f"mean RMS [m]: paper / ours (standard error); {runs} runs, static {SYSTEMS['static'].runs_factor * runs}"
     print_table("Table 2", ("nodes", *SYSTEMS), rows, caption)
-    rows = [(name, f"{rms:.3f} ({se:.3f})", f"{energy:.4f}") for name, rms, se, energy in same.rows]
+    cells = [(name, f"{rms:.3f} ({se:.3f})", f"{energy:.4f}") for name, rms, se, energy in same.rows]
     caption = "225 nodes, particle filter with pooled fusion for every policy"
-    print_table("One tracker for all", ("policy", "RMS [m]", "energy [mJ/period]"), rows, caption)
+    print_table("One tracker for all", ("policy", "RMS [m]", "energy [mJ/period]"), cells, caption)

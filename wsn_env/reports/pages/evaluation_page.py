@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from wsn_env.evaluation.comparison import Evaluation
 from wsn_env.evaluation.files import replacing
@@ -28,7 +29,7 @@ def write_report(
     folder: str | Path,
     evaluation: Evaluation | None = None,
     policies: dict[str, Policy] | None = None,
-    training: dict | None = None,
+    training: dict[str, Any] | None = None,
     progress: Progress | None = None,
 ) -> Path:
     """Write report.html into a folder.
@@ -36,8 +37,8 @@ def write_report(
     Args:
         folder: of the run or the evaluation; a training's learning curve is read from its progress-*/progress.csv.
         evaluation: left out: the page has no comparison.
-        policies: with an evaluation its policies by name, for histograms and the worst episode. The first is what the
-            others are compared with.
+        policies: those of the evaluation by name, for histograms and the worst episode; left out: neither. The first is
+            what the others are compared with.
         training: settings of the training.
         progress: called with (episodes' periods played, of, what).
 
@@ -49,7 +50,8 @@ def write_report(
     if evaluation is not None:
         names = ", ".join(evaluation.policies[:3]) + (", ..." if len(evaluation.policies) > 3 else "")
         title = f"{evaluation.scenario.name}: {names}"
-        sections = [*_comparison_sections(evaluation), *sections, *sample_sections(evaluation, policies, progress)]
+        samples = sample_sections(evaluation, policies, progress) if policies else []
+        sections = [*_comparison_sections(evaluation), *sections, *samples]
     return save_report(folder, title, [*sections, settings_section(evaluation, training)])
 
 
@@ -97,7 +99,7 @@ def _best_fronts(evaluation: Evaluation) -> Fronts:
 # --- settings ---
 
 
-def settings_section(evaluation: Evaluation | None, training: dict | None = None) -> str:
+def settings_section(evaluation: Evaluation | None, training: dict[str, Any] | None = None) -> str:
     """What was asked for, and the versions."""
     parts = []
     if evaluation is not None:

@@ -5,10 +5,14 @@ from __future__ import annotations
 import html
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
+from typing import TYPE_CHECKING, Literal
 
 from wsn_env.reports.pictures import svg_data_url
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def read_template(name: str) -> str:
@@ -21,7 +25,7 @@ def fill_template(name: str, **parts: str) -> str:
     return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], read_template(name))
 
 
-def build_page(kind: str, title: str, body: str) -> str:
+def build_page(kind: Literal["replay", "report"], title: str, body: str) -> str:
     """A page with our style.
 
     Args:
@@ -32,7 +36,7 @@ def build_page(kind: str, title: str, body: str) -> str:
     return fill_template("page.html", kind=kind, title=html.escape(title), style=read_template("style.css"), body=body)
 
 
-def json_for_script(data) -> str:
+def json_for_script(data: object) -> str:
     """JSON that cannot end the script element that it stands in."""
     return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
@@ -61,11 +65,11 @@ def collapsible(title: str, *parts: str, open: bool = False) -> str:
     return f"<details{' open' if open else ''}><summary>{html.escape(title)}</summary>{''.join(parts)}</details>"
 
 
-def values_table(values: dict) -> str:
+def values_table(values: Mapping[str, object]) -> str:
     """Names and values."""
     return table([(k, v if isinstance(v, str) else json.dumps(v, default=str)) for k, v in values.items()])
 
 
-def image(figure, words: str) -> str:
+def image(figure: Figure, words: str) -> str:
     """A matplotlib figure, and what it shows in words."""
     return f'<img alt="{html.escape(words)}" src="{svg_data_url(figure)}">'
