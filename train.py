@@ -32,22 +32,23 @@ from wsn_env.envs.prospects import ENTRY_FEATURES
 from wsn_env.envs.vector_env import ClusterVectorEnv
 from wsn_env.evaluation.comparison import evaluate
 from wsn_env.evaluation.files import replacing
-from wsn_env.evaluation.kept_blocks import forget_blocks
+from wsn_env.evaluation.kept_blocks import remove_kept_blocks
 from wsn_env.evaluation.policies import Policy, make_policy, policy_names
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.evaluation.rollout import FIRST_SEED, evaluation_seeds
 from wsn_env.evaluation.versions import versions
 from wsn_env.learning.actor_critic import EntryPolicy, network_of
-from wsn_env.learning.fleet import Fleet
+from wsn_env.learning.concat_vector_env import ConcatVectorEnv
+from wsn_env.learning.defaults import default_level, default_node_counts, default_order
 from wsn_env.learning.levelling import LevelledRollout
 from wsn_env.learning.network import Network
-from wsn_env.learning.recipe import other_densities, suited_level, suited_order
 from wsn_env.learning.sb3 import SB3VecEnv
 from wsn_env.learning.training_reward import TrainingReward
 from wsn_env.models.quantity import check_quantity, parse_overrides
-from wsn_env.reports.pages.report_page import write_report
+from wsn_env.reports.pages.evaluation_page import write_report
 from wsn_env.reports.pictures import write_picture
-from wsn_env.reports.tables import draw_front, print_tables, save_markdown
+from wsn_env.reports.plots import draw_comparison
+from wsn_env.reports.tables import print_tables, save_markdown
 from wsn_env.scenario import Scenario
 
 SIZED = ("nearest", "informed")  # compared with each of SIZES
@@ -196,11 +197,11 @@ def complete(settings: Training) -> Scenario:
     if len(settings.lam) > 2:
         raise ValueError(f"train.py: lam = {settings.lam}: must be one number, or two that it is drawn between")
     if settings.order is None:
-        settings.order = suited_order(scenario)
+        settings.order = default_order(scenario)
     if settings.level is None:
-        settings.level = suited_level(scenario)
+        settings.level = default_level(scenario)
     if settings.vary is None:
-        settings.vary = [f"nodes={nodes}" for nodes in other_densities(scenario)]
+        settings.vary = [f"nodes={nodes}" for nodes in default_node_counts(scenario)]
     return scenario.override(lam=settings.lam[0] if len(settings.lam) == 1 else tuple(settings.lam))
 
 
@@ -260,7 +261,7 @@ def learn_on_ray(settings: Training, scenario: Scenario, speaks: Settings, folde
         return training.network()
 
 
-def make_envs(settings: Training, scenario: Scenario, speaks: Settings, rows: int) -> Fleet:
+def make_envs(settings: Training, scenario: Scenario, speaks: Settings, rows: int) -> ConcatVectorEnv:
     """The rows, dealt among the scenarios."""
     scenarios = [scenario, *(scenario.override(**parse_overrides(text.split(","))) for text in settings.vary)]
     shares = np.diff(np.arange(len(scenarios) + 1) * rows // len(scenarios))
@@ -268,7 +269,7 @@ def make_envs(settings: Training, scenario: Scenario, speaks: Settings, rows: in
     for one, share in zip(scenarios, shares):
         envs = ClusterVectorEnv(int(share), one, autoreset_mode="Disabled", **asdict(speaks))
         parts.append(TrainingReward(envs, calibrated=settings.reward == "belief"))
-    return Fleet(parts)
+    return ConcatVectorEnv(parts)
 
 
 def check(settings: Training) -> None:
@@ -434,10 +435,10 @@ def compare(settings: Training, scenario: Scenario, policies: dict[str, Policy],
     evaluation.save(folder)
     save_markdown(evaluation, folder)
     print_tables(evaluation, reference="ppo")
-    write_picture(folder / "comparison.png", draw_front(evaluation, evaluation.middle_lam, emphasis="ppo"))
+    write_picture(folder / "comparison.png", draw_comparison(evaluation, evaluation.middle_lam, emphasis="ppo"))
     with progress_bar() as report:
         page = write_report(folder, evaluation, policies, made, report)
-    forget_blocks(folder)
+    remove_kept_blocks(folder)
     print(f"written: {folder / 'evaluation.csv'}, {folder / 'comparison.png'}, {page}")
 
 

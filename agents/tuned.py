@@ -1,4 +1,4 @@
-"""Parameters of hand-written rules, tuned on episodes that nothing else meets (`python -m wsn_env.learning.tuning`)."""
+"""Parameters of hand-written rules, tuned on episodes that nothing else meets (`python -m studies.tuning`)."""
 
 from __future__ import annotations
 

@@ -18,8 +18,8 @@ from rich.console import Console
 
 from benchmarks.race import Claim, Options, Result, Table, figure, main
 from wsn_env.filters.kernels import scratch
-from wsn_env.scenario import Scenario
 from wsn_env.models.state import Cluster, State
+from wsn_env.scenario import Scenario
 from wsn_env.simulation.world import World
 
 ID = "wsn_env/PreDC-v0"

@@ -19,9 +19,9 @@ from benchmarks.stopwatch import Stopwatch
 from benchmarks.vector import ID, MENU_ENTRY
 from wsn_env.compiled.kernels import lean_piece
 from wsn_env.envs.interface import Settings
-from wsn_env.simulation.geometry import nearest, nearest_candidates
-from wsn_env.scenario import Scenario
 from wsn_env.models.state import Network
+from wsn_env.scenario import Scenario
+from wsn_env.simulation.geometry import nearest, nearest_candidates
 from wsn_env.simulation.world import World
 
 NODES, SHORT_NODES = (225, 1000, 10_000, 100_000, 1_000_000), (225, 1000, 10_000)

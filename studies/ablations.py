@@ -25,7 +25,7 @@ from wsn_env.cli import make_scenario
 from wsn_env.envs.merit import ORDERS
 from wsn_env.evaluation.comparison import evaluate
 from wsn_env.evaluation.progress import progress_bar
-from wsn_env.learning.recipe import suited_level, suited_order
+from wsn_env.learning.defaults import default_level, default_order
 from wsn_env.scenario import Scenario
 
 USUAL = "usual"
@@ -110,7 +110,7 @@ def main() -> int:
 
 def variants(scenario: Scenario) -> list[str]:
     """What there is to try: all but what is usual under a name of its own."""
-    own = {f"order: {suited_order(scenario)}", LEVELS[suited_level(scenario)]}
+    own = {f"order: {default_order(scenario)}", LEVELS[default_level(scenario)]}
     return [name for name in (*DIFFERENT, ONE_LAM) if name not in own]
 
 

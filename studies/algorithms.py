@@ -22,7 +22,7 @@ from studies.report import save_table
 from wsn_env.cli import make_scenario
 from wsn_env.envs.vector_env import ClusterVectorEnv
 from wsn_env.evaluation.scoring import score
-from wsn_env.learning.recipe import suited_order
+from wsn_env.learning.defaults import default_order
 from wsn_env.learning.sb3 import SB3VecEnv
 from wsn_env.learning.training_reward import TrainingReward
 from wsn_env.scenario import Scenario
@@ -123,7 +123,7 @@ def one(study: Study, scenario: Scenario, name: str, seed: int) -> dict[float, n
     if not path.exists():
         maker, action = ALGORITHMS[name]
         span = scenario.override(lam=scenario.lam_span)
-        speaks = dict(action=action, observation="menu", order=suited_order(scenario))
+        speaks = dict(action=action, observation="menu", order=default_order(scenario))
         envs = ClusterVectorEnv(ROWS, span, reward="belief", autoreset_mode="Disabled", **speaks)
         model = maker(SB3VecEnv(TrainingReward(envs, calibrated=True), stagger=True), seed=10**6 * seed, device="cpu")
         started = time.perf_counter()

@@ -16,13 +16,11 @@ import numpy as np
 import tyro
 
 from train import Training, train
-from wsn_env.bluetooth.calibration import leave_one_out
+from wsn_env.bluetooth.fitting import leave_one_out
 from wsn_env.bluetooth.recorded_evaluation import (
     RecordedEvaluation,
     evaluate_recorded,
-    forget_recorded_blocks,
-    print_recorded,
-    save_recorded,
+    remove_recorded_blocks,
 )
 from wsn_env.envs.rendering.colours import BLUE, DARK, SKY, VERMILION
 from wsn_env.evaluation.files import replacing
@@ -30,6 +28,7 @@ from wsn_env.evaluation.policies import make_policy
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.evaluation.rollout import episodes
 from wsn_env.models.recordings.dataset import read_dataset
+from wsn_env.reports.recorded_tables import print_recorded_tables, save_recorded
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.world import World
 
@@ -88,8 +87,8 @@ def main() -> int:
             progress=report,
         )
     names = save_recorded(evaluation, asked.out)
-    forget_recorded_blocks(evaluation, asked.out)
-    print_recorded(evaluation)
+    remove_recorded_blocks(evaluation, asked.out)
+    print_recorded_tables(evaluation)
     draw_replay(evaluation, asked, asked.out / "replay.png")
     print(f"written: {', '.join(str(asked.out / name) for name in (*names, 'replay.png'))}")
     return 0

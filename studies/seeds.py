@@ -19,9 +19,9 @@ from wsn_env.agents.ppo import PPOPolicy
 from wsn_env.cli import make_scenario
 from wsn_env.evaluation.comparison import Evaluation, evaluate
 from wsn_env.evaluation.files import replacing
-from wsn_env.evaluation.front import hypervolumes, joined, numbered, points_of, reference_point
+from wsn_env.evaluation.front import hypervolumes, join_points, policy_points, reference_point, split_number
 from wsn_env.evaluation.intervals import Summary
-from wsn_env.evaluation.kept_blocks import forget_blocks
+from wsn_env.evaluation.kept_blocks import remove_kept_blocks
 from wsn_env.evaluation.policies import make_policy, policy_names
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.scenario import Scenario
@@ -69,7 +69,7 @@ def main() -> int:
     )
     with replacing(asked.out / "seeds.md") as path:
         path.write_text(text)
-    forget_blocks(asked.out)
+    remove_kept_blocks(asked.out)
     print(text)
     return 0
 
@@ -90,7 +90,7 @@ def families(evaluation: Evaluation, trained: list[str]) -> dict[str, list[str]]
     found: dict[str, list[str]] = {}
     for name in evaluation.policies:
         if name not in trained:
-            found.setdefault(numbered(name)[0], []).append(name)
+            found.setdefault(split_number(name)[0], []).append(name)
     return found
 
 
@@ -122,9 +122,9 @@ def table(evaluation: Evaluation, trained: list[str]) -> str:
         for lam in lams:
             best = best_of(evaluation, names, lam)
             theirs = evaluation.values(best, lam, "return").mean()
-            which = f"{numbered(best)[1]}: " if len(names) > 1 else ""
+            which = f"{split_number(best)[1]}: " if len(names) > 1 else ""
             cells.append(f"{which}{theirs:.1f} ({ahead_of(evaluation, trained, best, lam)})")
-        label = f"best of {stem}0..{numbered(names[-1])[1]}" if len(names) > 1 else stem
+        label = f"best of {stem}0..{split_number(names[-1])[1]}" if len(names) > 1 else stem
         lines.append(f"| {label} | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
@@ -143,8 +143,8 @@ def bounds(evaluation: Evaluation, trained: list[str]) -> str:
 def volumes(evaluation: Evaluation, trained) -> str:
     """Hypervolume of the union of all rules, and of each training's front with the paired difference to it."""
     reference = reference_point(evaluation.scenario)
-    by_policy = {name: points_of(evaluation, name) for name in evaluation.policies}
-    rules = joined(points for name, points in by_policy.items() if name not in trained)
+    by_policy = {name: policy_points(evaluation, name) for name in evaluation.policies}
+    rules = join_points(points for name, points in by_policy.items() if name not in trained)
     lines = []
     for name in trained:
         own, theirs = hypervolumes({name: by_policy[name], "rules": rules}, reference)

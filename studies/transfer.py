@@ -18,7 +18,7 @@ from studies.seeds import ahead_of, best_of, load, returns
 from wsn_env.cli import make_scenario
 from wsn_env.evaluation.comparison import Evaluation, evaluate
 from wsn_env.evaluation.files import replacing
-from wsn_env.evaluation.kept_blocks import forget_blocks
+from wsn_env.evaluation.kept_blocks import remove_kept_blocks
 from wsn_env.evaluation.policies import make_policy
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.scenario import Scenario
@@ -67,7 +67,7 @@ def main() -> int:
     with replacing(asked.out / f"{usual.name}.md") as path:
         path.write_text(text)
     for settings in worlds.values():
-        forget_blocks(folder_of(asked, settings))
+        remove_kept_blocks(folder_of(asked, settings))
     print(text)
     return 0
 

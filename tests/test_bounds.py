@@ -14,7 +14,8 @@ from wsn_env.evaluation.comparison import evaluate
 from wsn_env.evaluation.intervals import Summary
 from wsn_env.evaluation.rollout import episodes, evaluation_seeds, rollout
 from wsn_env.reports.pictures import write_picture
-from wsn_env.reports.tables import draw_front, markdown_table, print_tables
+from wsn_env.reports.plots import draw_comparison
+from wsn_env.reports.tables import format_markdown, print_tables
 from wsn_env.simulation import bound as bounds
 from wsn_env.simulation.bound import Bound, bound_kind
 
@@ -250,12 +251,12 @@ def test_the_ratio_and_its_interval():
 )
 def test_tables_say_what_it_is(name, column, words, tmp_path, capsys):
     evaluation = evaluate(["nearest2", "nearest3"], Scenario.named(name, particles=50, periods=4), episodes=4)
-    head, _, *lines = markdown_table(evaluation, evaluation.lams[0], "nearest2").splitlines()
+    head, _, *lines = format_markdown(evaluation, evaluation.lams[0], "nearest2").splitlines()
     assert ("RMS /" in head) == (column is not None) and (column or "") in head
     assert all(line.count("|") == head.count("|") for line in lines)
     print_tables(evaluation)
     assert words in " ".join(capsys.readouterr().out.split())
-    write_picture(tmp_path / "front.png", draw_front(evaluation, evaluation.lams[0]))
+    write_picture(tmp_path / "front.png", draw_comparison(evaluation, evaluation.lams[0]))
     row = evaluation.rows[0]
     assert (row["bound_m"] == "") == (row["floor_m"] == "") == (column is None)
     if column:

@@ -8,26 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wsn_env.bluetooth import calibration_report as report
-from wsn_env.bluetooth.calibration import (
-    Autocovariance,
-    Calibration,
-    CalibrationError,
-    advertisements,
-    bias_covariance,
-    calibrate,
-    fit_bias,
-    fit_mixture,
-    fit_path_loss,
-    gather,
-    leave_one_out,
-    measure_losses,
-    residuals,
-)
+from wsn_env.bluetooth.calibration import Calibration, CalibrationError
+from wsn_env.bluetooth.covariance import Autocovariance, bias_covariance, fit_bias
+from wsn_env.bluetooth.fitting import calibrate, fit_mixture, fit_path_loss, leave_one_out
+from wsn_env.bluetooth.losses import advertisements, measure_losses
+from wsn_env.bluetooth.packets import concatenate_tracks, hold_out, residuals
 from wsn_env.bluetooth.residual_map import CELL_M, residual_map, save_map
+from wsn_env.cli import Calibrate, run_calibrate
 from wsn_env.models.quantity import ScenarioError
+from wsn_env.models.recordings import dataset
 from wsn_env.models.recordings.dataset import Receivers, Track, read_dataset
 from wsn_env.models.recordings.replay import load_map
+from wsn_env.reports import calibration_tables
+from wsn_env.reports.calibration_tables import CALIBRATION_FILES
 
 RECORDED = os.environ.get("WSN_BLE_DIR")
 ROOM = Receivers(
@@ -197,7 +190,7 @@ def test_exact_cells_give_back_what_made_them():
 
 def test_lines_are_ridge_regression(tracks):
     """Against the normal equations of intercepts and slopes, the slopes drawn to that of a common one."""
-    packets = gather(tracks)
+    packets = concatenate_tracks(tracks)
     s, count = packets.receiver, len(ROOM.names)
     x = -10 * np.log10(packets.distance_m)
     one = (s[:, None] == np.arange(count)).astype(float)
@@ -316,7 +309,7 @@ def test_the_track_left_out_is_never_seen(tracks):
 def test_a_map_is_the_mean_of_a_gaussian_process(tracks, made):
     field = residual_map(tracks, made)
     assert (field.shape, field.dtype) == ((6, 80, 64), np.float32)
-    packets = gather(tracks)
+    packets = concatenate_tracks(tracks)
     residual = residuals(packets, made)
     cell = np.floor(packets.position_m[:, :2] / CELL_M)
     places = {}
@@ -336,7 +329,7 @@ def test_a_map_explains_a_track_it_never_saw():
     rng = np.random.default_rng(5)
     again = simulate(rng, walks=[walk(rng)] * 5)
     part = leave_one_out(again)[4]
-    packets = gather(again[4:])
+    packets = concatenate_tracks(again[4:])
     residual = residuals(packets, part)
     i, j = (packets.position_m[:, :2] / CELL_M).astype(int).T
     explained = residual - residual_map(again, part)[packets.receiver, i, j]
@@ -365,10 +358,10 @@ def test_a_map_needs_the_tracks_of_its_calibration(tracks, made):
 
 
 def test_the_command_writes_everything(tracks, monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(report, "read_dataset", lambda folder: tracks)
-    report.run_calibrate(tmp_path, tmp_path / "out", None, True)
+    monkeypatch.setattr(dataset, "read_dataset", lambda folder: tracks)
+    run_calibrate(Calibrate(tmp_path, tmp_path / "out", maps=True))
     stems = ["calibration", *(f"without_{one.name}" for one in tracks)]
-    expected = {f"{stem}.{end}" for stem in stems for end in ("json", "npz")} | set(report.REPORT_FILES)
+    expected = {f"{stem}.{end}" for stem in stems for end in ("json", "npz")} | set(CALIBRATION_FILES)
     assert {path.name for path in (tmp_path / "out").iterdir()} == expected
     assert Calibration.load(tmp_path / "out" / "without_walk0.json").tracks == ("walk1", "walk2")
     printed = capsys.readouterr().out
@@ -378,18 +371,18 @@ def test_the_command_writes_everything(tracks, monkeypatch, tmp_path, capsys):
 
 
 def test_the_command_leaves_out_what_it_is_told(tracks, monkeypatch, tmp_path):
-    monkeypatch.setattr(report, "read_dataset", lambda folder: tracks)
-    monkeypatch.setattr(report, "write_picture", lambda *_, **__: None)
-    report.run_calibrate(tmp_path, tmp_path / "out", "walk1", False)
+    monkeypatch.setattr(dataset, "read_dataset", lambda folder: tracks)
+    monkeypatch.setattr(calibration_tables, "write_picture", lambda *_, **__: None)
+    run_calibrate(Calibrate(tmp_path, tmp_path / "out", "walk1"))
     assert {path.name for path in (tmp_path / "out").glob("*.json")} == {"calibration.json", "without_walk1.json"}
     with pytest.raises(CalibrationError, match="'walk7': no such track; did you mean"):
-        report.run_calibrate(tmp_path, tmp_path / "none", "walk7", False)
+        run_calibrate(Calibrate(tmp_path, tmp_path / "none", "walk7"))
     assert not (tmp_path / "none").exists()
 
 
 def test_a_single_track_has_a_report(tracks, monkeypatch, tmp_path):
-    monkeypatch.setattr(report, "read_dataset", lambda folder: tracks[:1])
-    report.run_calibrate(tmp_path, tmp_path / "out")
+    monkeypatch.setattr(dataset, "read_dataset", lambda folder: tracks[:1])
+    run_calibrate(Calibrate(tmp_path, tmp_path / "out"))
     assert "this calibration" in (tmp_path / "out" / "calibration.md").read_text()
 
 
@@ -431,5 +424,5 @@ def test_the_recorded_tracks_one_by_one(recorded):
     white = [4.495, 4.500, 4.473, 4.490, 4.538, 4.503]
     assert [part.bias_db for part in parts] == pytest.approx(bias, abs=0.002)
     assert [part.white_db for part in parts] == pytest.approx(white, abs=0.002)
-    held = report.hold_out(recorded, calibrate(recorded), parts)
+    held = hold_out(recorded, calibrate(recorded), parts)
     assert held.residual_db.std() == pytest.approx(5.26, abs=0.05)

@@ -12,7 +12,8 @@ from wsn_env.evaluation.comparison import COLUMNS, Evaluation, evaluate
 from wsn_env.evaluation.intervals import Summary
 from wsn_env.evaluation.rollout import BLOCK, evaluation_seeds
 from wsn_env.reports.pictures import write_picture
-from wsn_env.reports.tables import draw_front, markdown_table, print_tables, save_markdown
+from wsn_env.reports.plots import draw_comparison
+from wsn_env.reports.tables import format_markdown, print_tables, save_markdown
 
 SCENARIO = Scenario.named("PreDC-v0", particles=60, nodes=40, side_m=50.0, crossing_m=20.0, periods=8)
 
@@ -118,10 +119,10 @@ def test_a_stopped_run_continues_where_it_was(tmp_path, monkeypatch):
 
 
 def test_tables_and_picture(evaluation, tmp_path):
-    table = markdown_table(evaluation, 10.0, "pre_dc").splitlines()
+    table = format_markdown(evaluation, 10.0, "pre_dc").splitlines()
     returns = [float(line.split("|")[2].split()[0]) for line in table[2:]]
     assert returns == sorted(returns, reverse=True) and len(returns) == 3
-    write_picture(tmp_path / "front.png", draw_front(evaluation, 10.0, emphasis="nearest0"))
+    write_picture(tmp_path / "front.png", draw_comparison(evaluation, 10.0, emphasis="nearest0"))
     assert (tmp_path / "front.png").read_bytes()[:4] == b"\x89PNG"
 
 

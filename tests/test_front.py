@@ -17,16 +17,16 @@ from wsn_env.evaluation.comparison import evaluate
 from wsn_env.evaluation.front import (
     OTHERS,
     Point,
-    fronts,
+    find_fronts,
     hypervolume,
     hypervolumes,
-    joined,
+    join_points,
     lam_sweep,
     reference_point,
     save_front,
 )
 from wsn_env.evaluation.intervals import Summary
-from wsn_env.reports.front import draw_fronts
+from wsn_env.reports.front_plots import draw_fronts
 from wsn_env.reports.pictures import write_picture
 from wsn_env.scenario import PRESETS
 
@@ -76,7 +76,7 @@ def test_more_points_never_lower_it_and_dominated_ones_add_nothing(some, more):
 def test_identical_fronts_do_not_differ_at_all():
     rng = np.random.default_rng(0)
     errors, energies = rng.gamma(4.0, 0.4, (5, 30)), rng.gamma(4.0, 0.1, (5, 30))
-    some = joined(points(*pair) for pair in zip(errors, energies))
+    some = join_points(points(*pair) for pair in zip(errors, energies))
     first, twin, others, union = hypervolumes(
         {"a": some, "b": some[::-1], "c": some[:3]}, REFERENCE
     )  # in another order, among other columns
@@ -103,7 +103,7 @@ def test_intervals_of_one_point_are_those_of_its_rectangle_and_cover():
 
 
 def test_rules_blind_to_lam_are_a_point_and_a_family_is_a_front(evaluation):
-    found = fronts(evaluation)
+    found = find_fronts(evaluation)
     assert list(found) == ["thrifty7", "nearest0..3", "pre_dc"]
     assert [point.lam for point in found["thrifty7"]] == [0.5, 2.0, 8.0]
     assert [point.policy for point in found["nearest0..3"]] == ["nearest0", "nearest1", "nearest3"]
@@ -111,14 +111,14 @@ def test_rules_blind_to_lam_are_a_point_and_a_family_is_a_front(evaluation):
     point = found["nearest0..3"][1]
     means = evaluation.summary("nearest1", 2.0)
     assert point.error == means["error_m"] and point.energy == means["energy_mj"]
-    union = joined([found["nearest0..3"], found["pre_dc"]])
+    union = join_points([found["nearest0..3"], found["pre_dc"]])
     assert len(union) == 4 and hypervolumes(found, (9.0, 1.0))[-1].hypervolume.mean == pytest.approx(
         hypervolume([point.values.mean(axis=0) for point in union], (9.0, 1.0))
     )
 
 
 def test_csv_holds_the_points_and_json_the_hypervolumes(evaluation, tmp_path):
-    found = fronts(evaluation)
+    found = find_fronts(evaluation)
     reference = reference_point(SCENARIO)
     volumes = hypervolumes(found, reference)
     save_front(evaluation, found, volumes, tmp_path)
@@ -128,7 +128,7 @@ def test_csv_holds_the_points_and_json_the_hypervolumes(evaluation, tmp_path):
         ("thrifty7", "thrifty7", "8.0"),
         ("nearest0..3", "nearest0", ""),
     ]
-    for row, point in zip(rows, joined(found.values()), strict=True):
+    for row, point in zip(rows, join_points(found.values()), strict=True):
         for name, summary in (("error", point.error), ("energy", point.energy)):
             unit = {"error": "m", "energy": "mj"}[name]
             read = Summary(*(float(row[column]) for column in (f"{name}_{unit}", f"{name}_low", f"{name}_high")))

@@ -15,7 +15,7 @@ from wsn_env.bluetooth.synthetic import write_dataset
 from wsn_env.cli import main
 from wsn_env.envs.registration import IDS
 from wsn_env.evaluation.rollout import episodes, evaluation_seeds
-from wsn_env.reports.pages.learning import read_progress
+from wsn_env.reports.pages.learning_curves import read_progress
 from wsn_env.reports.pages.replay_page import replay
 
 SEED = evaluation_seeds(0, 3)[2]

@@ -12,13 +12,13 @@ from wsn_env.agents.boundary import Boundary
 from wsn_env.agents.nearest import Nearest
 from wsn_env.agents.pre_dc import PreDC
 from wsn_env.agents.strongest_signal import StrongestSignal
+from wsn_env.models.physics.sensing import detection_probability
 
 from wsn_env import Scenario, View, World, evaluate, make_policy
 from wsn_env.cli import main
 from wsn_env.compiled import draws
 from wsn_env.evaluation.kept_blocks import BLOCKS_FILE
 from wsn_env.evaluation.policies import named_policies, policy_names
-from wsn_env.models.physics.sensing import detection_probability
 from wsn_env.models.state import Cluster
 
 SCENARIO = Scenario.named("PreDC-v0", particles=200)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from wsn_env import Cluster, Scenario, World
-from wsn_env.bluetooth.calibration import calibrate
+from wsn_env.bluetooth.fitting import calibrate
 from wsn_env.bluetooth.recorded_evaluation import evaluate_recorded
 from wsn_env.bluetooth.synthetic import write_dataset
 from wsn_env.cli import main

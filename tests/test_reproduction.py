@@ -7,18 +7,11 @@ import numpy as np
 import pytest
 
 from wsn_env.papers import reproduce
+from wsn_env.papers.claim import HOLDS, NOT_REPRODUCED, UNDER_READING, Expectation, print_expected, verdict
 from wsn_env.papers.pre_dc.claims import EXPECTED_RMS_M, PAPER_RMS_M, exceeds
 from wsn_env.papers.pre_dc.systems import NODES, SYSTEMS, motion_trial, scenario_as_read
-from wsn_env.papers.report import (
-    HOLDS,
-    NOT_REPRODUCED,
-    UNDER_READING,
-    Expectation,
-    print_expected,
-    print_table,
-    verdict,
-)
 from wsn_env.papers.rollout import Trial, play, play_all, standard_error
+from wsn_env.papers.sheet import print_table
 
 FIGURES = ("fig1", "fig3", "fig4", "fig5", "fig6", "fig7", "fig8")
 COLUMNS = {

@@ -9,7 +9,7 @@ from wsn_env.papers import reproduce
 from wsn_env.papers.binary.claims import DEFAULTS, SHIFT_BIAS_M, Study
 from wsn_env.papers.binary.readings import PAIRS, boundary_nodes, detecting_nodes, even_period_s, lens_m2
 from wsn_env.papers.binary.systems import FAULTS, FLIP, SYSTEMS, Results, Setting
-from wsn_env.papers.report import HOLDS, NOT_REPRODUCED, UNDER_READING
+from wsn_env.papers.claim import HOLDS, NOT_REPRODUCED, UNDER_READING
 from wsn_env.papers.rollout import play, standard_error
 
 PICTURES = ("error", "nodes", "radius", "period")

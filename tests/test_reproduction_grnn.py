@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from wsn_env.papers import reproduce
+from wsn_env.papers.claim import HOLDS, NOT_REPRODUCED, UNDER_READING
 from wsn_env.papers.grnn.claims import EXPECTED_EQUAL_INFORMATION_M, EXPECTED_POOR_START_M, EXPECTED_RMSE_M
 from wsn_env.papers.grnn.pitfalls import pitfalls
 from wsn_env.papers.grnn.systems import (
@@ -18,7 +19,6 @@ from wsn_env.papers.grnn.systems import (
     start_trial,
     track,
 )
-from wsn_env.papers.report import HOLDS, NOT_REPRODUCED, UNDER_READING
 from wsn_env.papers.rollout import exceeds, play
 
 COLUMNS = {

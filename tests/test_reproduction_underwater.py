@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wsn_env.papers import reproduce
-from wsn_env.papers.report import HOLDS, NOT_REPRODUCED, UNDER_READING
+from wsn_env.papers.claim import HOLDS, NOT_REPRODUCED, UNDER_READING
 from wsn_env.papers.rollout import exceeds, play
 from wsn_env.papers.underwater.claims import HARMLESS, MEDIAN_M, RMSE_M, SHARE_LOST, THRESHOLD
 from wsn_env.papers.underwater.systems import (

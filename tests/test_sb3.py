@@ -14,7 +14,7 @@ from tests.test_env import same
 from wsn_env import Cluster, ClusterEnv, ClusterVectorEnv, Scenario, make_policy
 from wsn_env.evaluation.comparison import evaluate
 from wsn_env.evaluation.policies import policy_names
-from wsn_env.learning.fleet import Fleet
+from wsn_env.learning.concat_vector_env import ConcatVectorEnv
 from wsn_env.learning.sb3 import SB3VecEnv
 from wsn_env.learning.training_reward import TrainingReward
 
@@ -133,7 +133,7 @@ def test_a_fleet_is_its_parts_one_after_the_other(mode, observation):
         settings = dict(autoreset_mode=mode, observation=observation, lam=(0.5, 8.0))
         return [ClusterVectorEnv(3 + i, **settings, **one) for i, one in enumerate(scenarios)]
 
-    fleet, alone = Fleet(parts()), parts()
+    fleet, alone = ConcatVectorEnv(parts()), parts()
     ours, theirs = fleet.reset(seed=5), [alone[0].reset(seed=5), alone[1].reset(seed=5 + 3)]
     rng = np.random.default_rng(0)
     for _ in range(30):
@@ -159,7 +159,7 @@ def test_a_fleet_is_its_parts_one_after_the_other(mode, observation):
     assert fleet.action_masks().shape == (7, 28) and fleet.lam.shape == (7,)
     other = ClusterVectorEnv(2, action="subset", observation=observation, autoreset_mode=mode, lam=(0.5, 8.0), **SMALL)
     with pytest.raises(ValueError, match="single_action_space.*differs"):
-        Fleet([*parts(), other])
+        ConcatVectorEnv([*parts(), other])
 
 
 def of_rows(observation, rows):

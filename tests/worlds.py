@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from wsn_env import Cluster, Scenario, World
-from wsn_env.scenario.tracking import BOUNDARY_TRACKERS, MEASUREMENTS, READS
 from wsn_env.models.state import RECEIVER, Sensors
+from wsn_env.scenario.tracking import BOUNDARY_TRACKERS, MEASUREMENTS, READS
 
 TRACKERS = ("particle", "particle", "particle", "ekf", "ukf", "ickf", "snapshot", *BOUNDARY_TRACKERS)
 MOTIONS = ["crossing", "straight", "sine", "circle", "turns", "waypoint"]

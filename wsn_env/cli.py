@@ -5,9 +5,10 @@ from __future__ import annotations
 import sys
 import time
 import traceback
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 
@@ -102,19 +103,19 @@ class Compile:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; bad input is one line on stderr and exit status 2, Ctrl-C is 130."""
-    runs = {
+    runs: dict[type, Callable[[Any], None]] = {
         Evaluate: run_evaluate,
         Replay: run_replay,
         Calibrate: run_calibrate,
         Reproduce: run_reproduce,
         Compile: run_compile,
     }
-    commands = {kind.__name__.lower(): kind for kind in runs}
+    commands: dict[str, Callable[..., Any]] = {kind.__name__.lower(): kind for kind in runs}
     command = tyro.extras.subcommand_cli_from_dict(commands, prog="wsn", args=arguments)
     try:
         runs[type(command)](command)
     except (ValueError, OSError, MemoryError) as problem:
-        print(f"wsn: {place_of(problem)}{problem}", file=sys.stderr)
+        print(f"wsn: {user_code_location(problem)}{problem}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         kept = isinstance(command, Evaluate) and command.out
@@ -123,9 +124,14 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def place_of(problem: Exception) -> str:
+def user_code_location(problem: Exception) -> str:
     """Where it arose, if that is in a file of the user's own: "mine.py:12: "."""
-    others = [Path(__file__).parents[1] / "wsn_env", Path(__file__).parents[1] / "agents", sys.prefix, sys.base_prefix]
+    others: list[str | Path] = [
+        Path(__file__).parents[1] / "wsn_env",
+        Path(__file__).parents[1] / "agents",
+        sys.prefix,
+        sys.base_prefix,
+    ]
     for frame in reversed(traceback.extract_tb(problem.__traceback__)):
         path = Path(frame.filename)
         if path.is_file() and not any(path.is_relative_to(folder) for folder in others):
@@ -137,11 +143,11 @@ def run_evaluate(command: Evaluate) -> None:
     """`wsn evaluate`."""
     from wsn_env.evaluation.comparison import evaluate
     from wsn_env.evaluation.front import check_front_libraries, lam_sweep
-    from wsn_env.evaluation.kept_blocks import forget_blocks
+    from wsn_env.evaluation.kept_blocks import remove_kept_blocks
     from wsn_env.evaluation.policies import named_policies
     from wsn_env.evaluation.ray_engine import on_ray
-    from wsn_env.reports.front import FRONT_FILES, report_front
-    from wsn_env.reports.pages.report_page import write_report
+    from wsn_env.reports.front_tables import FRONT_FILES, print_and_save_fronts
+    from wsn_env.reports.pages.evaluation_page import write_report
     from wsn_env.reports.pictures import can_draw
     from wsn_env.reports.tables import print_tables, save_markdown
 
@@ -151,12 +157,12 @@ def run_evaluate(command: Evaluate) -> None:
         run_evaluate_recorded(command)
         return
     scenario = make_scenario(command.scenario, command.set, command.tracks)
-    lams = command.lam
+    lams: Sequence[float] | None = command.lam
     if command.pareto:
         check_front_libraries(pictures=command.out is not None)
         lams = lams or lam_sweep(scenario)
     policies = named_policies(command.policies, scenario)
-    with progress_bar() as report:
+    with progress_bar() as progress:
         evaluation = evaluate(
             policies,
             scenario,
@@ -164,11 +170,11 @@ def run_evaluate(command: Evaluate) -> None:
             command.episodes,
             command.seed,
             keep=command.out,
-            progress=report,
+            progress=progress,
             engine=on_ray(command.address) if command.engine == "ray" else None,
         )
     if command.pareto:
-        report_front(evaluation, command.out)
+        print_and_save_fronts(evaluation, command.out)
     else:
         print_tables(evaluation)
     if command.out:
@@ -176,23 +182,24 @@ def run_evaluate(command: Evaluate) -> None:
         save_markdown(evaluation, command.out)
         names = ["evaluation.csv", "evaluation.json", "evaluation.md", *(FRONT_FILES if command.pareto else ())]
         if can_draw():
-            with progress_bar() as report:
-                names.append(write_report(command.out, evaluation, policies, progress=report).name)
-        forget_blocks(command.out)
+            with progress_bar() as progress:
+                names.append(write_report(command.out, evaluation, policies, progress=progress).name)
+        remove_kept_blocks(command.out)
         print(f"written: {', '.join(str(command.out / name) for name in names)}")
 
 
 def run_evaluate_recorded(command: Evaluate) -> None:
     """`wsn evaluate --scenario Ble-v0 --tracks FOLDER`."""
-    from wsn_env.bluetooth import recorded_evaluation
+    from wsn_env.bluetooth.recorded_evaluation import evaluate_recorded, remove_recorded_blocks
     from wsn_env.evaluation.ray_engine import on_ray
-    from wsn_env.reports.pages.recorded_report import write_recorded_report
+    from wsn_env.reports.pages.recorded_page import write_recorded_report
     from wsn_env.reports.pictures import can_draw
+    from wsn_env.reports.recorded_tables import print_recorded_tables, save_recorded
 
     if command.pareto or len(command.tracks) != 1:
         raise ValueError("--tracks: must be one folder with tetam.dev and *.mbd, without --pareto")
-    with progress_bar() as report:
-        evaluation = recorded_evaluation.evaluate_recorded(
+    with progress_bar() as progress:
+        evaluation = evaluate_recorded(
             command.policies,
             make_scenario(command.scenario, command.set, []),
             command.tracks[0],
@@ -200,17 +207,17 @@ def run_evaluate_recorded(command: Evaluate) -> None:
             command.episodes,
             command.seed,
             keep=command.out,
-            progress=report,
+            progress=progress,
             engine=on_ray(command.address) if command.engine == "ray" else None,
             calibrated=any(pair.startswith("calibration=") for pair in command.set),
         )
-    recorded_evaluation.print_recorded(evaluation)
+    print_recorded_tables(evaluation)
     if command.out:
-        names = recorded_evaluation.save_recorded(evaluation, command.out)
+        names = save_recorded(evaluation, command.out)
         if can_draw():
-            with progress_bar() as report:
-                names.append(write_recorded_report(command.out, evaluation, command.policies, report).name)
-        recorded_evaluation.forget_recorded_blocks(evaluation, command.out)
+            with progress_bar() as progress:
+                names.append(write_recorded_report(command.out, evaluation, command.policies, progress).name)
+        remove_recorded_blocks(evaluation, command.out)
         print(f"written: {', '.join(str(command.out / name) for name in names)}")
 
 
@@ -220,8 +227,8 @@ def run_replay(command: Replay) -> None:
     from wsn_env.evaluation.policies import named_policies
     from wsn_env.reports.pages.replay_page import replay
 
-    given = {} if command.lam is None else {"lam": command.lam}
-    scenario = make_scenario(command.scenario, command.set, [], **given)
+    lam = {} if command.lam is None else {"lam": command.lam}
+    scenario = make_scenario(command.scenario, command.set, [], **lam)
     if command.recording:
         calibrated = any(pair.startswith("calibration=") for pair in command.set)
         scenario = replay_scenario(scenario, command.recording, calibrated)
@@ -233,9 +240,19 @@ def run_replay(command: Replay) -> None:
 
 def run_calibrate(command: Calibrate) -> None:
     """`wsn calibrate`."""
-    from wsn_env.bluetooth.calibration_report import run_calibrate
+    from wsn_env.bluetooth.calibration_files import calibrate_with_and_without, save_calibrations
+    from wsn_env.models.recordings.dataset import read_dataset
+    from wsn_env.reports.calibration_tables import CALIBRATION_FILES, print_calibration, save_calibration_report
+    from wsn_env.reports.tables import wide_console
 
-    run_calibrate(command.tracks, command.out, command.leave_out, command.maps)
+    tracks = read_dataset(command.tracks)
+    whole, parts = calibrate_with_and_without(tracks, command.leave_out)
+    shown = [whole, *(part for part in parts if command.leave_out in (None, part.left_out))]
+    names = save_calibrations(tracks, shown, command.out, command.maps)
+    save_calibration_report(tracks, whole, parts, command.out)
+    print_calibration(whole, parts)
+    written = f"{command.out}: {', '.join([*names, *CALIBRATION_FILES])}"
+    wide_console().print(written, markup=False, highlight=False)
 
 
 def run_reproduce(command: Reproduce) -> None:
@@ -274,7 +291,7 @@ def run_compile(command: Compile) -> None:
     print(f"compiled in {time.perf_counter() - started:.0f} s")
 
 
-def make_scenario(name: str, pairs: list[str], tracks: list[Path], **further) -> Scenario:
+def make_scenario(name: str, pairs: list[str], tracks: list[Path], **further: object) -> Scenario:
     """A scenario from the options --scenario, --set and --tracks; `further` quantities win."""
     recorded = {"motion": "recorded", "tracks": tuple(map(str, tracks))} if tracks else {}
     return Scenario.named(name, **parse_overrides(pairs) | recorded | further)

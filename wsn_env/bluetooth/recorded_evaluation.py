@@ -1,8 +1,8 @@
-"""Comparison on recorded tracks: each is replayed, with a calibration that has not seen it.
+"""Comparison on recorded tracks: each is replayed, with a calibration made without it.
 
-An episode is a track with the draws of one seed, which are those of the filter (and of policies that throw dice): the
-packets are always the recorded ones. Means are taken over the tracks first, so that a long track counts no more than a
-short one; their spread over seeds says how far the filter's luck goes, not how another track would turn out.
+An episode is a track with the draws of one seed, which are those of the filter (and of random policies): the packets
+are always the recorded ones. Means are taken over the tracks first, so that a long track counts no more than a short
+one; their spread over seeds says how much the filter's random numbers matter, not how another track would turn out.
 """
 
 from __future__ import annotations
@@ -15,22 +15,17 @@ from pathlib import Path
 
 import numpy as np
 
-from wsn_env.bluetooth.calibration import calibrate, leave_one_out
-from wsn_env.envs.rendering.colours import BLUE, DARK, GREEN, ORANGE, PURPLE, SKY, VERMILION, YELLOW
+from wsn_env.bluetooth.fitting import calibrate, leave_one_out
 from wsn_env.evaluation.comparison import COLUMNS, Evaluation, evaluate, stem_of
 from wsn_env.evaluation.files import replacing
-from wsn_env.evaluation.kept_blocks import forget_blocks
+from wsn_env.evaluation.kept_blocks import remove_kept_blocks
 from wsn_env.evaluation.progress import Progress
 from wsn_env.evaluation.rollout import Engine
 from wsn_env.evaluation.versions import versions
+from wsn_env.models.measurement.beacon import Beacon
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.models.recordings.dataset import DatasetError, read_dataset, track_files, track_name
-from wsn_env.reports.pictures import can_draw, plain, write_picture
-from wsn_env.reports.tables import wide_console
 from wsn_env.scenario import Scenario
-
-REFERENCE = "all"
-FAMILIES = (BLUE, ORANGE, GREEN, PURPLE, SKY, YELLOW)
 
 
 @dataclass(frozen=True)
@@ -57,6 +52,11 @@ class RecordedEvaluation:
         means = self.values(policy, lam, column).mean(axis=0)
         return float(means.std(ddof=1)) if len(means) > 1 else 0.0
 
+    @property
+    def description(self) -> str:
+        """How many tracks there are, and how often each was replayed."""
+        return f"{len(self.by_track)} recorded tracks, {self.first.episodes} filter seeds each"
+
     def family(self, stem: str, lam: float) -> list[str]:
         """The members of a numbered family, the most frugal first."""
         members = [policy for policy in self.first.policies if policy != stem and stem_of(policy) == stem]
@@ -69,6 +69,19 @@ class RecordedEvaluation:
         if len(members) < 2 or not energies[0] <= energy_mj <= energies[-1]:
             return None
         return float(np.interp(energy_mj, energies, [self.mean(policy, lam, "rms_m") for policy in members]))
+
+    def save(self, out: str | Path) -> None:
+        """Write tracks.csv and tracks.json into a folder, each whole or not at all."""
+        out = Path(out)
+        out.mkdir(parents=True, exist_ok=True)
+        with replacing(out / "tracks.csv") as path, open(path, "w", newline="") as file:
+            writer = csv.DictWriter(file, ["track", *COLUMNS], lineterminator="\n")
+            writer.writeheader()
+            for name, each in self.by_track.items():
+                writer.writerows({"track": name} | row for row in each.rows)
+        settings = {name: each.settings() for name, each in self.by_track.items()}
+        with replacing(out / "tracks.json") as path:
+            path.write_text(json.dumps({"tracks": settings, "versions": versions()}, indent=1))
 
 
 def evaluate_recorded(
@@ -99,21 +112,22 @@ def evaluate_recorded(
     Raises:
         ValueError: another scenario, nothing to read, or too few tracks to leave one out.
     """
-    _check_hears(scenario)
+    _beacon_of(scenario)
     paths = {track_name(path): path for path in track_files(folder)}
-    known = {name: scenario for name in paths}
+    scenarios = {name: scenario for name in paths}
     if not calibrated:
         if len(paths) < 2:
             raise ValueError(
                 f"{folder}: holds one track: leaving it out leaves none to calibrate on (give calibration=)"
             )
-        for each in leave_one_out(read_dataset(folder)):
-            known[each.left_out] = scenario.override(**each.quantities)
+        tracks = read_dataset(folder)
+        for track, without in zip(tracks, leave_one_out(tracks)):
+            scenarios[track.name] = scenario.override(**without.quantities)
     evaluations = {}
     for number, (name, path) in enumerate(paths.items()):
         evaluations[name] = evaluate(
-            of_track(policies, name),
-            _replay(known[name], name, path),
+            insert_track_name(policies, name),
+            _replay(scenarios[name], name, path),
             lams,
             seeds,
             seed,
@@ -124,7 +138,7 @@ def evaluate_recorded(
     return RecordedEvaluation(evaluations)
 
 
-def of_track(policies: Sequence[str], track: str) -> list[str]:
+def insert_track_name(policies: Sequence[str], track: str) -> list[str]:
     """Names of policies, with the track's for {track}."""
     return [policy.replace("{track}", track) for policy in policies]
 
@@ -140,7 +154,7 @@ def replay_scenario(scenario: Scenario, path: str | Path, calibrated: bool = Fal
     Raises:
         ValueError: another scenario, or no such track.
     """
-    _check_hears(scenario)
+    _beacon_of(scenario)
     path = Path(path)
     if not path.is_file():
         raise DatasetError(f"{path}: is no file; a recorded track is a *.mbd file")
@@ -150,15 +164,17 @@ def replay_scenario(scenario: Scenario, path: str | Path, calibrated: bool = Fal
     return _replay(scenario, track_name(path), path)
 
 
-def _check_hears(scenario: Scenario) -> None:
-    if not scenario.measurement.lasting_errors:
+def _beacon_of(scenario: Scenario) -> Beacon:
+    """Its measurement, which must hear a beacon."""
+    if not isinstance(scenario.measurement, Beacon):
         raise ScenarioError(
             f"scenario = {scenario.name!r}: has no receivers that hear a beacon; recorded tracks are for Ble-v0"
         )
+    return scenario.measurement
 
 
 def _replay(scenario: Scenario, name: str, path: Path) -> Scenario:
-    maps = scenario.measurement.residual_map
+    maps = _beacon_of(scenario).residual_map
     maps = maps and maps.replace("{track}", name)
     return scenario.override(motion="replay", recording=str(path), residual_map=maps)
 
@@ -167,148 +183,10 @@ def _shifted(progress: Progress, number: int, of: int, name: str) -> Progress:
     return lambda done, total, what: progress(number * total + done, of * total, f"{name}: {what}")
 
 
-def table(evaluation: RecordedEvaluation, lam: float) -> tuple[list[str], list[list[str]]]:
-    """Header and rows: the mean RMS over the tracks, its ratio to that of all receivers, consistency, energy, and each
-    track's RMS."""
-    first = evaluation.first
-    reference = evaluation.mean(REFERENCE, lam, "rms_m") if REFERENCE in first.policies else None
-    header = ["policy", "RMS m", "sd over seeds", "/ all", "e²/trace", "energy mJ/period", "listening"]
-    rows = []
-    for policy in first.policies:
-        rms = evaluation.mean(policy, lam, "rms_m")
-        rows.append(
-            [
-                policy,
-                f"{rms:.2f}",
-                f"{evaluation.spread(policy, lam, 'rms_m'):.2f}",
-                "" if reference is None else f"{rms / reference:.2f}",
-                f"{evaluation.mean(policy, lam, 'anees'):.2f}",
-                f"{evaluation.mean(policy, lam, 'energy_mj'):.1f}",
-                f"{evaluation.mean(policy, lam, 'members'):.1f}",
-                *(f"{value:.2f}" for value in evaluation.values(policy, lam, "rms_m").mean(axis=1)),
-            ]
-        )
-    return header + list(evaluation.by_track), rows
-
-
-def remarks(evaluation: RecordedEvaluation, lam: float) -> list[str]:
-    """How each single policy stands to each family at its energy."""
-    lines, policies = [], evaluation.first.policies
-    stems = evaluation.first.families()
-    for policy in policies:
-        if stem_of(policy) in stems:
-            continue
-        energy, rms = evaluation.mean(policy, lam, "energy_mj"), evaluation.mean(policy, lam, "rms_m")
-        for stem in stems:
-            there = evaluation.at_energy(stem, lam, energy)
-            if there is not None:
-                lines.append(
-                    f"{policy}: {rms:.2f} m at {energy:.1f} mJ; {stem} at that energy, interpolated: {there:.2f} m"
-                )
-    return lines
-
-
-def print_recorded(evaluation: RecordedEvaluation) -> None:
-    """A table for each lam."""
-    from rich.table import Table
-
-    console = wide_console()
-    for lam in evaluation.first.lams:
-        header, rows = table(evaluation, lam)
-        title = f"{evaluation.first.scenario.name}, {about_the_tracks(evaluation)}, lam = {lam:g} m/mJ"
-        drawn = Table(title=title, caption="\n".join(remarks(evaluation, lam)))
-        for name in header:
-            drawn.add_column(name, justify="left" if name == "policy" else "right")
-        for row in rows:
-            drawn.add_row(*row)
-        console.print(drawn)
-
-
-def about_the_tracks(evaluation: RecordedEvaluation) -> str:
-    """How many there are, and how often each was replayed."""
-    return f"{len(evaluation.by_track)} recorded tracks, {evaluation.first.episodes} filter seeds each"
-
-
-def markdown(evaluation: RecordedEvaluation) -> str:
-    """The same as Markdown."""
-    parts = []
-    for lam in evaluation.first.lams:
-        header, rows = table(evaluation, lam)
-        lines = [f"## {about_the_tracks(evaluation)}, lam = {lam:g} m/mJ", ""]
-        lines += ["| " + " | ".join(header) + " |", "|---" + "|--:" * (len(header) - 1) + "|"]
-        lines += ["| " + " | ".join(row) + " |" for row in rows]
-        parts.append("\n".join([*lines, "", *(f"- {line}" for line in remarks(evaluation, lam))]))
-    return "\n\n".join(parts) + "\n"
-
-
-def save_recorded(evaluation: RecordedEvaluation, out: str | Path) -> list[str]:
-    """Write tracks.csv, .json, .md and, with matplotlib, .png into a folder, each whole or not at all; returns their
-    names."""
-    out = Path(out)
-    out.mkdir(parents=True, exist_ok=True)
-    with replacing(out / "tracks.csv") as path, open(path, "w", newline="") as file:
-        writer = csv.DictWriter(file, ["track", *COLUMNS], lineterminator="\n")
-        writer.writeheader()
-        for name, each in evaluation.by_track.items():
-            writer.writerows({"track": name} | row for row in each.rows)
-    settings = {name: each.settings() for name, each in evaluation.by_track.items()}
-    with replacing(out / "tracks.json") as path:
-        path.write_text(json.dumps({"tracks": settings, "versions": versions()}, indent=1))
-    with replacing(out / "tracks.md") as path:
-        path.write_text(markdown(evaluation))
-    names = ["tracks.csv", "tracks.json", "tracks.md"]
-    if can_draw():
-        names.append("tracks.png")
-        write_picture(out / "tracks.png", draw_recorded(evaluation))
-    return names
-
-
-def forget_recorded_blocks(evaluation: RecordedEvaluation, out: str | Path) -> None:
+def remove_recorded_blocks(evaluation: RecordedEvaluation, out: str | Path) -> None:
     """Remove the kept blocks of a finished run."""
     out = Path(out)
     for name in evaluation.by_track:
-        forget_blocks(out / "tracks" / name)
+        remove_kept_blocks(out / "tracks" / name)
         (out / "tracks" / name).rmdir()
     (out / "tracks").rmdir()
-
-
-def draw_recorded(evaluation: RecordedEvaluation):
-    """Figure of RMS against energy: families as lines, single policies as points, one for each lam that they see."""
-    from matplotlib.figure import Figure
-
-    lams, policies = evaluation.first.lams, evaluation.first.policies
-    lam = lams[0]
-    stems = evaluation.first.families()
-    figure = Figure(figsize=(8, 5.2), layout="constrained")
-    axes = figure.subplots()
-    colours = iter(FAMILIES)
-    for stem in stems:
-        members = evaluation.family(stem, lam)
-        xs = [evaluation.mean(policy, lam, "energy_mj") for policy in members]
-        ys = [evaluation.mean(policy, lam, "rms_m") for policy in members]
-        axes.errorbar(
-            xs,
-            ys,
-            yerr=[evaluation.spread(policy, lam, "rms_m") for policy in members],
-            marker="o",
-            markersize=4,
-            linewidth=1.2,
-            color=next(colours, DARK),
-            label=plain(stem.rstrip(":=n")),
-        )
-    for k, policy in enumerate(policies):
-        if stem_of(policy) not in stems:
-            points = [[evaluation.mean(policy, each, name) for name in ("energy_mj", "rms_m")] for each in lams]
-            points = sorted(dict.fromkeys(map(tuple, points)))  # one, if it does not look at lam
-            learned = policy.startswith("ppo")
-            style = dict(marker="*", markersize=13, color=VERMILION) if learned else dict(marker="s", color=DARK)
-            axes.plot(*zip(*points), linewidth=1.2, zorder=4 if learned else 3, **style)
-            side = (6, 8) if k % 2 else (6, -13)
-            axes.annotate(plain(policy), points[-1], xytext=side, textcoords="offset points", fontsize=9)
-    axes.set_xlabel("energy [mJ per period]")
-    axes.set_ylabel("RMS error, mean over the tracks [m]")
-    axes.set_title(plain(f"{evaluation.first.scenario.name}: {about_the_tracks(evaluation)}"))
-    axes.grid(alpha=0.3)
-    if stems:
-        axes.legend(frameon=False)
-    return figure

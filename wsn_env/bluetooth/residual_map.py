@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from wsn_env.bluetooth.calibration import Calibration, CalibrationError, gather, residuals
+from wsn_env.bluetooth.calibration import Calibration, CalibrationError
+from wsn_env.bluetooth.packets import concatenate_tracks, residuals
 from wsn_env.evaluation.files import replacing
 from wsn_env.models.recordings.replay import CELL_M
 
@@ -22,7 +23,7 @@ SHARED_NOISE, PACKET_NOISE = 3.0, 18.0  # dB^2 of a cell's mean: drift, and whit
 
 
 def residual_map(tracks: Sequence[Track], calibration: Calibration) -> np.ndarray:
-    """Mean of the field given the residuals of the calibration's own tracks: Gaussian process regression.
+    """Mean of the field, conditioned on the residuals of the calibration's own tracks: Gaussian process regression.
 
         k(d) = 5 exp(-d / 1.5 m) dB^2,   noise of a cell's mean residual = 3 + 18 / packets dB^2
 
@@ -31,16 +32,16 @@ def residual_map(tracks: Sequence[Track], calibration: Calibration) -> np.ndarra
 
     Returns: (S, nx, ny) float32, dB to add to the lines; cell (i, j) is centred at ((i + 1/2) .25, (j + 1/2) .25) m.
     """
-    known = {track.name: track for track in tracks}
-    missing = [name for name in calibration.tracks if name not in known]
+    by_name = {track.name: track for track in tracks}
+    missing = [name for name in calibration.tracks if name not in by_name]
     if missing:
         raise CalibrationError(f"tracks: {', '.join(missing)} is missing, which the calibration was made of")
-    chosen = [known[name] for name in calibration.tracks]
-    packets = gather(chosen)
+    chosen = [by_name[name] for name in calibration.tracks]
+    packets = concatenate_tracks(chosen)
     residual = residuals(packets, calibration)
     nx, ny = (ceil(limit / CELL_M) for limit in chosen[0].receivers.limits_m)
-    centres = np.stack(np.meshgrid(np.arange(nx), np.arange(ny), indexing="ij"), axis=-1).reshape(-1, 2)
-    centres = (centres + 0.5) * CELL_M
+    cells = np.stack(np.meshgrid(np.arange(nx), np.arange(ny), indexing="ij"), axis=-1).reshape(-1, 2)
+    centres = (cells + 0.5) * CELL_M
     fields = []
     for receiver in range(len(chosen[0].receivers.names)):
         heard = packets.receiver == receiver

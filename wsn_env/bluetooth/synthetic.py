@@ -50,7 +50,9 @@ def receiver_positions() -> np.ndarray:
     return np.column_stack([SHARES * np.array(ROOM_M), heights]).round(2)
 
 
-def packet_lines(rng, places: np.ndarray, at_1m: np.ndarray, start_s: float, seconds: float) -> list[str]:
+def packet_lines(
+    rng: np.random.Generator, places: np.ndarray, at_1m: np.ndarray, start_s: float, seconds: float
+) -> list[str]:
     """The packets of a walk, in the order of time."""
     time = np.arange(0, seconds, INTERVAL_S)
     position = walk(rng, time)
@@ -69,7 +71,7 @@ def packet_lines(rng, places: np.ndarray, at_1m: np.ndarray, start_s: float, sec
     return sorted(lines)
 
 
-def walk(rng, time: np.ndarray) -> np.ndarray:
+def walk(rng: np.random.Generator, time: np.ndarray) -> np.ndarray:
     """Positions (N, 3) m on straight ways between random points, 1 m or more from the walls."""
     corners = rng.uniform(1, np.array(ROOM_M) - 1, (2 + int(time[-1]), 2))
     way = np.append(0, np.cumsum(np.hypot(*np.diff(corners, axis=0).T)))

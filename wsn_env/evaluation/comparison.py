@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +33,7 @@ COLUMNS = (
     "policy scenario lam episode seed periods return error_m rms_m energy_mj members handovers searches lost"
     " bound_m floor_m anees"
 ).split()
+Row = dict[str, str | float]  # of the columns in COLUMNS
 MEANS = ("return", "rms_m", "error_m", "energy_mj", "members", "handovers", "searches", "lost")
 
 
@@ -44,7 +46,7 @@ class Evaluation:
     lams: tuple[float, ...]
     episodes: int
     seed: int
-    rows: list[dict]
+    rows: list[Row]
 
     @property
     def middle_lam(self) -> float:
@@ -52,10 +54,10 @@ class Evaluation:
         return sorted(self.lams)[len(self.lams) // 2]
 
     @cached_property
-    def _rows_of(self) -> dict[tuple[str, float], list[dict]]:
-        found: dict[tuple[str, float], list[dict]] = {}
+    def _rows_of(self) -> dict[tuple[str, float], list[Row]]:
+        found: dict[tuple[str, float], list[Row]] = {}
         for row in self.rows:
-            found.setdefault((row["policy"], row["lam"]), []).append(row)
+            found.setdefault((str(row["policy"]), float(row["lam"])), []).append(row)
         return found
 
     def values(self, policy: str, lam: float, column: str) -> np.ndarray:
@@ -75,8 +77,8 @@ class Evaluation:
             return None
         return Summary.of_root_ratio(*(self.values(policy, lam, column) ** 2 for column in ("rms_m", "bound_m")))
 
-    def floor_m(self) -> float | None:
-        """Root of the mean squared floor, the same for every policy; None: there is no bound."""
+    def bound_all_awake_m(self) -> float | None:
+        """Root mean square of the bound with all nodes awake, the same for every policy; None: there is no bound."""
         if bound_kind(self.scenario) == "none":
             return None
         return float(np.sqrt(np.mean(self.values(self.policies[0], self.lams[0], "floor_m") ** 2)))
@@ -131,13 +133,13 @@ class Evaluation:
         with replacing(out / "evaluation.json") as path:
             path.write_text(json.dumps(self.settings() | {"versions": versions(), "means": means}, indent=1))
 
-    def _against_the_bound(self, policy: str, lam: float) -> dict:
+    def _against_the_bound(self, policy: str, lam: float) -> dict[str, object]:
         ratio = self.rms_over_bound(policy, lam)
-        return (
-            {} if ratio is None else {f"rms_over_{bound_kind(self.scenario)}": vars(ratio), "floor_m": self.floor_m()}
-        )
+        if ratio is None:
+            return {}
+        return {f"rms_over_{bound_kind(self.scenario)}": vars(ratio), "floor_m": self.bound_all_awake_m()}
 
-    def settings(self) -> dict:
+    def settings(self) -> dict[str, Any]:
         """What was asked for."""
         return _settings(self.scenario, self.policies, self.lams, self.episodes, self.seed)
 
@@ -175,22 +177,24 @@ def evaluate(
     Raises:
         ValueError: for an unknown policy, or seed and episodes out of range.
     """
-    if lams is None and isinstance(scenario.lam, (tuple, list)):
-        raise ValueError(f"scenario.lam = {scenario.lam}: name the lams to compare at, one number each")
-    lams = tuple(dict.fromkeys(map(float, [scenario.lam] if lams is None else lams)))
+    if lams is None:
+        if isinstance(scenario.lam, (tuple, list)):
+            raise ValueError(f"scenario.lam = {scenario.lam}: name the lams to compare at, one number each")
+        lams = [scenario.lam]
+    lams = tuple(dict.fromkeys(map(float, lams)))
     if not policies or not lams:
         raise ValueError("policies and lams must name at least one each")
     named = policies if isinstance(policies, dict) else named_policies(policies, scenario)
     seeds = evaluation_seeds(seed, episodes)
     kept = KeptBlocks(keep, _settings(scenario, named, lams, episodes, seed), list(named.values()))
-    blocks: dict[tuple, Block] = {}
+    blocks: dict[tuple[str, float | None, int], Block] = {}
     for lam in lams:
         at_this = scenario.override(lam=lam)
         for name, policy in named.items():
-            seen = lam if getattr(policy, "sees_lam", True) else None
+            used_lam = lam if getattr(policy, "sees_lam", True) else None
             for number in range(-(-episodes // BLOCK)):
                 own = seeds[number * BLOCK : (number + 1) * BLOCK]
-                blocks.setdefault((name, seen, number), Block(name, seen, number, policy, at_this, own))
+                blocks.setdefault((name, used_lam, number), Block(name, used_lam, number, policy, at_this, own))
     missing = [block for block in blocks.values() if not kept.has(block)]
     for done, (block, measured) in enumerate((engine or in_this_process(threads))(missing), len(blocks) - len(missing)):
         kept.put(block, measured)
@@ -199,15 +203,17 @@ def evaluate(
     rows = []
     for lam in lams:
         for name, policy in named.items():
-            seen = lam if getattr(policy, "sees_lam", True) else None
-            measured = [one for number in range(-(-episodes // BLOCK)) for one in kept.get(name, seen, number)]
+            used_lam = lam if getattr(policy, "sees_lam", True) else None
+            measured = [one for number in range(-(-episodes // BLOCK)) for one in kept.get(name, used_lam, number)]
             for episode, values in enumerate(at_lam(measured, lam)):
                 row = {"policy": name, "scenario": scenario.name, "episode": episode, "seed": seeds[episode]} | values
                 rows.append({column: row[column] for column in COLUMNS})
     return Evaluation(scenario, tuple(named), lams, episodes, seed, rows)
 
 
-def _settings(scenario: Scenario, policies, lams, episodes: int, seed: int) -> dict:
+def _settings(
+    scenario: Scenario, policies: Iterable[str], lams: Iterable[float], episodes: int, seed: int
+) -> dict[str, Any]:
     return {
         "scenario": scenario.as_dict(),
         "policies": list(policies),

@@ -72,31 +72,31 @@ def lam_sweep(scenario: Scenario, number: int = 9) -> tuple[float, ...]:
     return tuple(float(f"{lam:.2g}") for lam in np.geomspace(low, high, number))
 
 
-def fronts(evaluation: Evaluation) -> Fronts:
+def find_fronts(evaluation: Evaluation) -> Fronts:
     """Every policy's points in the order of the lams; a family's in the order of the numbers."""
     families: dict[tuple[str, bool], list[tuple[str, list[Point]]]] = {}
     for policy in evaluation.policies:
-        points = points_of(evaluation, policy)
-        stem, number = numbered(policy)
+        points = policy_points(evaluation, policy)
+        stem, number = split_number(policy)
         family = (stem, True) if number and len(points) == 1 else (policy, False)
         families.setdefault(family, []).append((number, points))
-    found = {}
+    found: Fronts = {}
     for (stem, joins), members in families.items():
         if joins:
             members.sort(key=lambda member: int(member[0]))
             first, last = members[0][0], members[-1][0]
             stem += first if first == last else f"{first}..{last}"
-        found[stem] = joined(points for _, points in members)
+        found[stem] = join_points(points for _, points in members)
     return found
 
 
-def numbered(policy: str) -> tuple[str, str]:
+def split_number(policy: str) -> tuple[str, str]:
     """("nearest", "3") from "nearest3"; ("pre_dc", "") from "pre_dc"."""
     stem = stem_of(policy)
     return stem, policy[len(stem) :]
 
 
-def points_of(evaluation: Evaluation, policy: str) -> list[Point]:
+def policy_points(evaluation: Evaluation, policy: str) -> list[Point]:
     """A policy's front: a point for each lam, or a single one where lam made no difference."""
     columns = [
         np.stack([evaluation.values(policy, lam, column) for column in ("error_m", "energy_mj")], axis=-1)
@@ -107,7 +107,7 @@ def points_of(evaluation: Evaluation, policy: str) -> list[Point]:
     return [Point(policy, lam, values) for lam, values in zip(evaluation.lams, columns)]
 
 
-def joined(some: Iterable[list[Point]]) -> list[Point]:
+def join_points(some: Iterable[list[Point]]) -> list[Point]:
     """The points of several fronts as one front: their union."""
     return [point for points in some for point in points]
 
@@ -137,11 +137,11 @@ def hypervolumes(fronts: Fronts, reference: tuple[float, float]) -> list[Volume]
         reference: error [m], energy [mJ a period].
     """
     if len(fronts) > 2:
-        fronts = fronts | {OTHERS: joined(list(fronts.values())[1:])}
-    values = np.stack([point.values for point in joined(fronts.values())], axis=1)  # (episodes, points, 2)
+        fronts = fronts | {OTHERS: join_points(list(fronts.values())[1:])}
+    values = np.stack([point.values for point in join_points(fronts.values())], axis=1)  # (episodes, points, 2)
     ends = np.cumsum([len(points) for points in fronts.values()])[:-1]
 
-    def measure(episodes) -> list[float]:
+    def measure(episodes: np.ndarray | slice) -> list[float]:
         # A mean over the first axis adds row by row: equal columns give equal bits.
         return [hypervolume(part, reference) for part in np.split(values[episodes].mean(axis=0), ends)]
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 RESAMPLES = 2000
 KEPT_EPISODES = 5000  # the resamples of more take too much memory to keep
@@ -21,15 +22,15 @@ class Summary:
     high: float
 
     @classmethod
-    def of(cls, values) -> Summary:
+    def of(cls, values: ArrayLike) -> Summary:
         """Percentile bootstrap over episodes, with a fixed seed; no interval for a single episode."""
-        values = np.asarray(values, dtype=float)
-        if len(values) < 2 or np.ptp(values) == 0:
-            return cls(float(values.mean()), float(values.min()), float(values.max()))
-        return cls.around(values.mean(), resampled_means(values))
+        numbers = np.asarray(values, dtype=float)
+        if len(numbers) < 2 or np.ptp(numbers) == 0:
+            return cls(float(numbers.mean()), float(numbers.min()), float(numbers.max()))
+        return cls.around(numbers.mean(), resampled_means(numbers))
 
     @classmethod
-    def of_root_ratio(cls, values, references) -> Summary:
+    def of_root_ratio(cls, values: np.ndarray, references: np.ndarray) -> Summary:
         """sqrt(mean(values) / mean(references)) of pairs, the interval as in `of`."""
         ratio = float(np.sqrt(np.mean(values) / np.mean(references)))
         if len(values) < 2:
@@ -38,13 +39,13 @@ class Summary:
         return cls.around(ratio, np.sqrt(means[:, 0] / means[:, 1]))
 
     @classmethod
-    def around(cls, value: float, resampled) -> Summary:
+    def around(cls, value: float, resampled: np.ndarray) -> Summary:
         """A value and the middle 95 % of what resamples gave for it."""
         low, high = np.percentile(resampled, [2.5, 97.5])
         return cls(float(value), float(low), float(high))
 
 
-def resampled_means(values) -> np.ndarray:
+def resampled_means(values: np.ndarray) -> np.ndarray:
     """Means over RESAMPLES bootstrap samples of the episodes, the same for all quantities of so many episodes.
 
     Args:

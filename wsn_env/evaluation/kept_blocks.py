@@ -54,7 +54,7 @@ class KeptBlocks:
                 file.write(json.dumps([*block[:3], measured]) + "\n")
 
 
-def forget_blocks(folder: str | Path) -> None:
+def remove_kept_blocks(folder: str | Path) -> None:
     """Remove the kept blocks of a finished run."""
     (Path(folder) / BLOCKS_FILE).unlink(missing_ok=True)
 

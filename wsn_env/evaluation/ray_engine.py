@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import logging
 import socket
 import sys
 from collections.abc import Iterator, Sequence
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 from wsn_env.evaluation.rollout import Block, Engine, in_this_process
 from wsn_env.models.own import OF_FILES
+
+if TYPE_CHECKING:
+    from ray import ObjectRef
 
 AHEAD = 4  # tasks a core that wait their turn
 PATIENCE_S = 5.0
@@ -30,7 +36,7 @@ def on_ray(address: str | None = None) -> Engine:
     except ImportError:
         raise ValueError("engine 'ray': Ray is not installed: pip install 'wsn_env[ray]'") from None
 
-    def play(blocks: Sequence[Block]) -> Iterator[tuple[Block, list[dict]]]:
+    def play(blocks: Sequence[Block]) -> Iterator[tuple[Block, list[dict[str, float]]]]:
         ours = not ray.is_initialized()
         if ours:
             connect(address)
@@ -59,20 +65,21 @@ def connect(address: str | None) -> None:
         except (OSError, ValueError) as problem:
             raise ValueError(f"engine 'ray': nobody answers at {address!r} ({problem}): {allowed}") from None
     try:
-        ray.init(address or "local", log_to_driver=False, logging_level="error")
+        ray.init(address or "local", log_to_driver=False, logging_level=logging.ERROR)
     except ConnectionError as problem:
         raise ValueError(f"engine 'ray': no cluster at {address!r} ({problem}): {allowed}") from None
 
 
-def _spread(ray, blocks: Sequence[Block]) -> Iterator[tuple[Block, list[dict]]]:
+def _spread(ray: ModuleType, blocks: Sequence[Block]) -> Iterator[tuple[Block, list[dict[str, float]]]]:
     for module in {type(block.policy).__module__ for block in blocks}:
         if module.startswith(OF_FILES):  # which workers cannot import
             ray.cloudpickle.register_pickle_by_value(sys.modules[module])
     task = ray.remote(num_cpus=1, max_retries=-1, scheduling_strategy="SPREAD")(_measured)
-    waiting, running = list(reversed(blocks)), {}
+    waiting = list(reversed(blocks))
+    running: dict[ObjectRef[list[dict[str, float]]], Block] = {}
     while waiting or running:
-        room = AHEAD * max(1, int(ray.cluster_resources().get("CPU", 1)))
-        while waiting and len(running) < room:
+        most = AHEAD * max(1, int(ray.cluster_resources().get("CPU", 1)))
+        while waiting and len(running) < most:
             block = waiting.pop()
             running[task.remote(block)] = block
         for done in ray.wait(list(running))[0]:
@@ -83,5 +90,5 @@ def _spread(ray, blocks: Sequence[Block]) -> Iterator[tuple[Block, list[dict]]]:
             yield running.pop(done), measured
 
 
-def _measured(block: Block) -> list[dict]:
+def _measured(block: Block) -> list[dict[str, float]]:
     return next(in_this_process(threads=1)([block]))[1]

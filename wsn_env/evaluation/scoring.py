@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from gymnasium.vector import VectorEnv
 
+from wsn_env.evaluation.native_envs import native
 from wsn_env.evaluation.rollout import evaluation_seeds
 
 
-def score(act: Callable, envs: VectorEnv, seed: int = 0) -> np.ndarray:
+def score(act: Callable[[Any], Any], envs: VectorEnv, seed: int = 0) -> np.ndarray:
     """Play one whole episode in every row: the first B of `evaluate(..., seed=seed)`, so that both are paired.
 
     The reward of the environment and of its wrappers plays no part: a return is -sum(error + lam * energy), of the true
@@ -24,8 +26,9 @@ def score(act: Callable, envs: VectorEnv, seed: int = 0) -> np.ndarray:
 
     Returns: (B,).
     """
-    observations, _ = envs.reset(seed=evaluation_seeds(seed, envs.num_envs))
-    lam, periods = envs.unwrapped.lam.copy(), envs.unwrapped.scenario.periods
+    seeds: Any = evaluation_seeds(seed, envs.num_envs)  # the native environment takes a seed for each row
+    observations, _ = envs.reset(seed=seeds)
+    lam, periods = native(envs).lam.copy(), native(envs).scenario.periods
     errors, energies = np.zeros((2, envs.num_envs))
     for _ in range(periods):
         observations, _, _, _, info = envs.step(act(observations))

@@ -1,1 +1,1 @@
-"""What training a scheduler takes: networks, adapters to the libraries, rewards, tuning."""
+"""What training a scheduler takes: networks, adapters to the libraries and rewards."""

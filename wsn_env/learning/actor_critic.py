@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import torch
+from stable_baselines3 import PPO
 from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.type_aliases import Schedule
 from torch import nn
 
 from wsn_env.learning.network import EntryNetwork, FlatNetwork, Network
@@ -28,15 +32,15 @@ class EntryActorCritic(nn.Module):
         outputs: int,
         actor: tuple[int, int],
         critic: tuple[int, int],
-    ):
+    ) -> None:
         super().__init__()
-        self.sizes = belief, entry, outputs
-        self.belief = nn.Linear(belief, actor[0])
-        self.entry = nn.Linear(entry, actor[0], bias=False)
-        self.hidden = nn.Linear(actor[0], actor[1])
-        self.score = nn.Linear(actor[1], outputs)
+        self.sizes: tuple[int, int, int] = belief, entry, outputs
+        self.belief: nn.Linear = nn.Linear(belief, actor[0])
+        self.entry: nn.Linear = nn.Linear(entry, actor[0], bias=False)
+        self.hidden: nn.Linear = nn.Linear(actor[0], actor[1])
+        self.score: nn.Linear = nn.Linear(actor[1], outputs)
         layers = [nn.Linear(observation, critic[0]), nn.Tanh(), nn.Linear(critic[0], critic[1]), nn.Tanh()]
-        self.critic = nn.Sequential(*layers, nn.Linear(critic[1], 1))
+        self.critic: nn.Sequential = nn.Sequential(*layers, nn.Linear(critic[1], 1))
         for layer in self.modules():
             if isinstance(layer, nn.Linear):
                 gain = 0.01 if layer is self.score else 1.0 if layer is self.critic[-1] else 2**0.5
@@ -44,11 +48,11 @@ class EntryActorCritic(nn.Module):
                 if layer.bias is not None:
                     nn.init.zeros_(layer.bias)
 
-    def forward(self, observation):
+    def forward(self, observation: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Logits and value, as stable-baselines3 takes them from an `mlp_extractor`."""
         return self.forward_actor(observation), self.forward_critic(observation)
 
-    def forward_actor(self, observation):
+    def forward_actor(self, observation: torch.Tensor) -> torch.Tensor:
         """(B, logits)."""
         belief, entry, outputs = self.sizes
         entries = observation[:, belief:].reshape(len(observation), -1, entry)
@@ -61,7 +65,7 @@ class EntryActorCritic(nn.Module):
         awake = nn.functional.pad(scores[:, 1:, 1:], (1, 0))
         return torch.cat([scores[:, :, 0], awake.flatten(1)], dim=1)
 
-    def forward_critic(self, observation):
+    def forward_critic(self, observation: torch.Tensor) -> torch.Tensor:
         """(B, 1)."""
         return self.critic(observation)
 
@@ -79,25 +83,30 @@ class EntryActorCritic(nn.Module):
 class EntryPolicy(ActorCriticPolicy):
     """PPO's policy with an EntryActorCritic; `entries` are its arguments."""
 
-    def __init__(self, *args, entries: dict | None = None, **kwargs):
-        self.entries = entries
+    mlp_extractor: EntryActorCritic  # type: ignore[assignment]  # in the place of the library's own
+
+    def __init__(self, *args: Any, entries: dict[str, Any] | None = None, **kwargs: Any) -> None:
+        self.entries: dict[str, Any] = entries or {}
         super().__init__(*args, **kwargs)
 
-    def _build(self, lr_schedule) -> None:
+    def _build(self, lr_schedule: Schedule) -> None:
         self.mlp_extractor = EntryActorCritic(**self.entries)
-        self.action_net, self.value_net = nn.Identity(), nn.Identity()
-        self.optimizer = self.optimizer_class(self.parameters(), lr=lr_schedule(1), **self.optimizer_kwargs)
+        # The network gives logits and values itself.
+        self.action_net, self.value_net = nn.Identity(), nn.Identity()  # type: ignore[assignment]
+        arguments: dict[str, Any] = {"lr": lr_schedule(1), **self.optimizer_kwargs}
+        self.optimizer = self.optimizer_class(self.parameters(), **arguments)
 
-    def _get_constructor_parameters(self):
+    def _get_constructor_parameters(self) -> dict[str, Any]:
         return super()._get_constructor_parameters() | {"entries": self.entries}
 
 
-def network_of(model) -> Network:
+def network_of(model: PPO) -> Network:
     """The actor of a stable-baselines3 PPO model: an EntryPolicy's, or one with two tanh layers."""
     policy = model.policy
     if isinstance(policy, EntryPolicy):
         return policy.mlp_extractor.network()
-    linear = [m for m in [*policy.mlp_extractor.policy_net, policy.action_net] if hasattr(m, "weight")]
+    layers = [*policy.mlp_extractor.policy_net, policy.action_net]
+    linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
     arrays = {}
     for i, layer in enumerate(linear):
         arrays[f"{i}.weight"] = layer.weight.detach().cpu().numpy().T

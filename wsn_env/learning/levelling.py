@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import torch
 from stable_baselines3.common.buffers import RolloutBuffer
 
 from wsn_env.envs.features import BELIEF_FEATURES, BOUND
@@ -10,7 +13,7 @@ from wsn_env.envs.features import BELIEF_FEATURES, BOUND
 WIDTH = BELIEF_FEATURES.index("major_sd")
 STEPS = 2  # widths kept apart, in a factor e
 MEMORY = 0.8  # of the rollouts before
-LITTLE = 50.0  # transitions at the size of all: what a width counts as that was hardly ever met
+PRIOR_TRANSITIONS = 50.0  # transitions at the size of all: what a width counts as that was hardly ever met
 
 
 class Levelling:
@@ -25,7 +28,7 @@ class Levelling:
             they are.
     """
 
-    def __init__(self, level: float):
+    def __init__(self, level: float) -> None:
         self._level = level
         # Transitions so far and the sums of their squared advantages, by width.
         self._sums = np.zeros((2, 1 + round(2 * BOUND * STEPS)))
@@ -45,7 +48,7 @@ class Levelling:
         for sums, weights in zip(self._sums, (np.ones_like(squares), squares)):
             sums += np.bincount(width.ravel(), weights.ravel(), len(sums))
         met, summed = self._sums
-        size = np.sqrt((summed + LITTLE * summed.sum() / met.sum()) / (met + LITTLE))
+        size = np.sqrt((summed + PRIOR_TRANSITIONS * summed.sum() / met.sum()) / (met + PRIOR_TRANSITIONS))
         return (advantages / size[width] ** self._level).astype(np.float32)
 
 
@@ -57,11 +60,11 @@ class LevelledRollout(RolloutBuffer):
         The rest: of RolloutBuffer.
     """
 
-    def __init__(self, *args, level: float = 0.0, **kwargs):
+    def __init__(self, *args: Any, level: float = 0.0, **kwargs: Any) -> None:
         self._levelling = Levelling(level)
         super().__init__(*args, **kwargs)
 
-    def compute_returns_and_advantage(self, last_values, dones) -> None:
+    def compute_returns_and_advantage(self, last_values: torch.Tensor, dones: np.ndarray) -> None:
         """As RolloutBuffer, then level."""
         super().compute_returns_and_advantage(last_values, dones)
-        self.advantages = self._levelling(self.observations, self.advantages)
+        self.advantages: np.ndarray = self._levelling(self.observations, self.advantages)

@@ -12,7 +12,7 @@ from wsn_env.compiled.kernels import kernel, piece
 
 
 @piece
-def _add_product(x, w, out):
+def _add_product(x: np.ndarray, w: np.ndarray, out: np.ndarray) -> None:
     """out += x w, in the order of x."""
     for i in range(len(w)):
         for j in range(len(out)):
@@ -20,7 +20,16 @@ def _add_product(x, w, out):
 
 
 @kernel
-def _run_flat(observations, w0, b0, w1, b1, w2, b2, out):
+def _run_flat(
+    observations: np.ndarray,
+    w0: np.ndarray,
+    b0: np.ndarray,
+    w1: np.ndarray,
+    b1: np.ndarray,
+    w2: np.ndarray,
+    b2: np.ndarray,
+    out: np.ndarray,
+) -> None:
     h0, h1 = np.empty(len(b0), F), np.empty(len(b1), F)
     for row in range(len(observations)):
         h0[:] = b0
@@ -36,7 +45,17 @@ def _run_flat(observations, w0, b0, w1, b1, w2, b2, out):
 
 
 @kernel
-def _run_entries(observations, belief_w, belief_b, entry_w, hidden_w, hidden_b, score_w, score_b, out):
+def _run_entries(
+    observations: np.ndarray,
+    belief_w: np.ndarray,
+    belief_b: np.ndarray,
+    entry_w: np.ndarray,
+    hidden_w: np.ndarray,
+    hidden_b: np.ndarray,
+    score_w: np.ndarray,
+    score_b: np.ndarray,
+    out: np.ndarray,
+) -> None:
     size, width = belief_w.shape[0], entry_w.shape[0]
     context, h0, h1 = np.empty(len(belief_b), F), np.empty(len(belief_b), F), np.empty(len(hidden_b), F)
     for row in range(len(observations)):
@@ -64,8 +83,8 @@ class Network:
 
     SHAPES: ClassVar[dict[str, tuple[str, ...]]]
 
-    def __init__(self, arrays: dict[str, np.ndarray]):
-        self.arrays = {name: np.ascontiguousarray(arrays[name], F) for name in self.SHAPES}
+    def __init__(self, arrays: dict[str, np.ndarray]) -> None:
+        self.arrays: dict[str, np.ndarray] = {name: np.ascontiguousarray(arrays[name], F) for name in self.SHAPES}
         self.sizes: dict[str, int] = {}
         for name, axes in self.SHAPES.items():
             shape = self.arrays[name].shape

@@ -6,9 +6,12 @@ import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import gymnasium as gym
+import numpy as np
 import ray
+import torch
 from ray.rllib.algorithms.ppo import PPOConfig
 from ray.rllib.algorithms.ppo.torch.ppo_torch_learner import PPOTorchLearner
 from ray.rllib.connectors.connector_v2 import ConnectorV2
@@ -34,14 +37,15 @@ FIRST_S = 900.0  # a rollout may take so long: runners compile their kernels in 
 class EntryModule(TorchRLModule, ValueFunctionAPI):
     """An EntryActorCritic; model_config["entries"] are its arguments."""
 
-    def setup(self):
+    def setup(self) -> None:
         """Make the network."""
-        self.net = EntryActorCritic(**self.model_config["entries"])
+        config: Any = self.model_config
+        self.net: EntryActorCritic = EntryActorCritic(**config["entries"])
 
-    def _forward(self, batch, **kwargs):
+    def _forward(self, batch: dict[str, Any], **kwargs: Any) -> dict[str, Any]:
         return {Columns.ACTION_DIST_INPUTS: self.net.forward_actor(batch[Columns.OBS])}
 
-    def compute_values(self, batch, embeddings=None):
+    def compute_values(self, batch: dict[str, Any], embeddings: Any | None = None) -> torch.Tensor:
         """(B,) of the critic."""
         return self.net.forward_critic(batch[Columns.OBS]).squeeze(-1)
 
@@ -52,18 +56,20 @@ class LevelledLearner(PPOTorchLearner):
     def build(self) -> None:
         """As PPO's; then, after the advantages, level."""
         super().build()
-        self._learner_connector.append(_Level(self.config.learner_config_dict["level"]))
+        connector: Any = self._learner_connector  # made by then
+        connector.append(_Level(self.config.learner_config_dict["level"]))
 
 
 class _Level(ConnectorV2):
-    def __init__(self, level: float):
+    def __init__(self, level: float) -> None:
         super().__init__()
         self._levelling = Levelling(level)
 
-    def __call__(self, *, batch, **kwargs):
+    def __call__(self, *, batch: dict[str, Any], **kwargs: Any) -> dict[str, Any]:
         for own in batch.values():
             advantages = own[Postprocessing.ADVANTAGES]
-            levelled = self._levelling(*map(convert_to_numpy, (own[Columns.OBS], advantages)))
+            observations: Any = convert_to_numpy(own[Columns.OBS])
+            levelled = self._levelling(observations, np.asarray(convert_to_numpy(advantages)))
             own[Postprocessing.ADVANTAGES] = advantages.new_tensor(levelled)
         return batch
 
@@ -71,13 +77,17 @@ class _Level(ConnectorV2):
 class _OwnSeeds(gym.vector.VectorWrapper):
     """RLlib seeds runner w with seed + w, and rows take seed + i: the runners would meet nearly the same fields."""
 
-    def __init__(self, envs: gym.vector.VectorEnv, first: int):
+    def __init__(self, envs: gym.vector.VectorEnv, first: int) -> None:
         super().__init__(envs)
         self._first = first
 
-    def reset(self, *, seed=None, options=None):
-        """Row i of runner w gets first + w rows + i."""
-        own = None if seed is None else self._first + (seed - self._first) * self.num_envs
+    def reset(
+        self, *, seed: int | list[int] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Row i of runner w gets first + w rows + i; seeds of single rows stay."""
+        own: Any = (
+            seed if seed is None or isinstance(seed, list) else self._first + (seed - self._first) * self.num_envs
+        )
         return self.env.reset(seed=own, options=options)
 
 
@@ -100,7 +110,7 @@ class RayTraining:
     def __init__(
         self,
         make_rows: Callable[[int], gym.vector.VectorEnv],
-        entries: dict,
+        entries: dict[str, Any],
         folder: Path,
         *,
         rows: int,
@@ -109,9 +119,9 @@ class RayTraining:
         level: float,
         seed: int,
         address: str | None = None,
-        **training,
-    ):
-        self.periods = 0
+        **training: Any,
+    ) -> None:
+        self.periods: int = 0
         self._folder = folder
         connect(address)
         register_env("wsn_env", lambda context: _OwnSeeds(make_rows(context["num_envs"]), seed))
@@ -149,7 +159,7 @@ class RayTraining:
     def __enter__(self) -> RayTraining:
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         self._algorithm.stop()
         ray.shutdown()
 
@@ -183,4 +193,5 @@ class RayTraining:
 
     def network(self) -> EntryNetwork:
         """The actor as NumPy arrays."""
-        return self._algorithm.get_module().net.network()
+        module: Any = self._algorithm.get_module()
+        return module.net.network()

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
+
+from wsn_env.evaluation.native_envs import native
 
 
 class SB3VecEnv(VecEnv):
@@ -18,14 +22,14 @@ class SB3VecEnv(VecEnv):
     empty.
 
     Args:
-        envs: a ClusterVectorEnv or a Fleet, wrapped or not, in same-step or disabled autoreset mode. Next-step's extra
-            reset row is no transition: it is refused.
+        envs: a ClusterVectorEnv or a ConcatVectorEnv, wrapped or not, in same-step or disabled autoreset mode.
+            Next-step's extra reset row is no transition: it is refused.
         stagger: let the rows' first episodes end early, evenly spread, as truncations: later resets stay spread.
             Disabled mode only.
     """
 
-    def __init__(self, envs: gym.vector.VectorEnv, stagger: bool = False):
-        self._native = envs.unwrapped
+    def __init__(self, envs: gym.vector.VectorEnv, stagger: bool = False) -> None:
+        self._native = native(envs)
         self._mode = self._native.autoreset_mode
         if self._mode == AutoresetMode.NEXT_STEP:
             raise ValueError("autoreset_mode NextStep makes rows that are no transitions: use SameStep or Disabled")
@@ -34,7 +38,7 @@ class SB3VecEnv(VecEnv):
         if stagger and self._mode != AutoresetMode.DISABLED:
             raise ValueError("stagger=True needs autoreset_mode Disabled")
         self.envs = envs
-        self.seconds = 0.0  # wall time spent in step and reset
+        self.seconds: float = 0.0  # wall time spent in step and reset
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
         self._first_end = np.full(envs.num_envs, -1)
         if stagger:
@@ -43,38 +47,39 @@ class SB3VecEnv(VecEnv):
             self._first_end = np.concatenate(ends)
         self._steps = 0
 
-    def reset(self):
+    def reset(self) -> VecEnvObs:
         """New episodes in all rows."""
         started = time.perf_counter()
-        observation, info = self.envs.reset(seed=list(self._seeds))
+        seeds: Any = list(self._seeds)  # the native environment takes a seed for each row
+        observation, info = self.envs.reset(seed=seeds)
         self.seconds += time.perf_counter() - started
-        self.reset_infos = [_row_info(info, i) for i in range(self.num_envs)]
+        self.reset_infos: list[dict[str, Any]] = [_row_info(info, i) for i in range(self.num_envs)]
         self._reset_seeds()
         self._reset_options()
         self._steps = 0
         return observation
 
-    def step_async(self, actions) -> None:
+    def step_async(self, actions: np.ndarray) -> None:
         """Remember the actions."""
         self._actions = actions
 
-    def step_wait(self):
+    def step_wait(self) -> VecEnvStepReturn:
         """One period; ended rows give the first observation of their next episode."""
         started = time.perf_counter()
         result = self._step()
         self.seconds += time.perf_counter() - started
         return result
 
-    def _step(self):
+    def _step(self) -> VecEnvStepReturn:
         observation, rewards, terminated, truncated, info = self.envs.step(self._actions)
         self._steps += 1
         truncated = truncated | (self._first_end == self._steps)
         done = terminated | truncated
-        infos: list[dict] = [{} for _ in range(self.num_envs)]
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         if done.any():
             same_step = self._mode == AutoresetMode.SAME_STEP
             last = info["final_info"] if same_step else info
-            for i in np.flatnonzero(done):
+            for i in np.flatnonzero(done).tolist():
                 infos[i] = _row_info(last, i)
                 infos[i]["terminal_observation"] = info["final_obs"][i] if same_step else _row(observation, i)
                 infos[i]["TimeLimit.truncated"] = bool(truncated[i] and not terminated[i])
@@ -87,20 +92,22 @@ class SB3VecEnv(VecEnv):
         """Close the environments."""
         self.envs.close()
 
-    def get_attr(self, attr_name: str, indices=None) -> list[Any]:
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
         """An attribute of the vector environment, once for each row."""
         return [getattr(self._native, attr_name) for _ in self._get_indices(indices)]
 
-    def set_attr(self, attr_name: str, value: Any, indices=None) -> None:
+    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
         """Refused: the rows share one environment."""
         raise AttributeError(f"cannot set {attr_name!r} of single rows: make the environment with other settings")
 
-    def env_method(self, method_name: str, *method_args, indices=None, **method_kwargs) -> list[Any]:
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
+    ) -> list[Any]:
         """Call a batched method, such as action_masks(), and slice its answer."""
         answer = getattr(self._native, method_name)(*method_args, **method_kwargs)
         return [answer[i] for i in self._get_indices(indices)]
 
-    def env_is_wrapped(self, wrapper_class, indices=None) -> list[bool]:
+    def env_is_wrapped(self, wrapper_class: type[gym.Wrapper], indices: VecEnvIndices = None) -> list[bool]:
         """Rows are never wrapped one by one."""
         return [False for _ in self._get_indices(indices)]
 
@@ -108,16 +115,17 @@ class SB3VecEnv(VecEnv):
         """Whether the vector environment has the attribute."""
         return hasattr(self._native, attr_name)
 
-    def get_images(self):
+    def get_images(self) -> Sequence[np.ndarray | None]:
         """Frames of all rows."""
-        return self.envs.render()
+        frames: Any = self.envs.render()
+        return frames
 
 
-def _row(arrays, i: int):
+def _row(arrays: VecEnvObs, i: int) -> Any:
     return {name: value[i].copy() for name, value in arrays.items()} if isinstance(arrays, dict) else arrays[i].copy()
 
 
-def _row_info(info: dict, i: int) -> dict:
+def _row_info(info: dict[str, Any], i: int) -> dict[str, Any]:
     """Row i of a Gymnasium vector info, as plain values."""
     row = {}
     for name, value in info.items():

@@ -1,13 +1,18 @@
-"""Rewards as learners want them: of one size for every scenario and lam, and of low variance without a bias."""
+"""Rewards as learners need them: of one size for every scenario and lam, and of low variance without a bias."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
+from wsn_env.evaluation.native_envs import native
+from wsn_env.scenario import Scenario
+
 WIDTHS = np.arange(-1.0, 4.5, 0.5)  # of beliefs, log2 of their rms over a scenario's typical error
-HARDLY_ANYTHING_M = 100.0
+PRIOR_M = 100.0  # of error in every width before the first period: soon outweighed
 
 
 class TrainingReward(gym.vector.VectorWrapper):
@@ -23,26 +28,26 @@ class TrainingReward(gym.vector.VectorWrapper):
             whose infos are the next episodes' where one ends.
     """
 
-    def __init__(self, envs: gym.vector.VectorEnv, scaled: bool = True, calibrated: bool = False):
-        if envs.unwrapped.interface.reward_space is not None:
-            raise ValueError("reward 'vector': learners want one number, 'error' or 'belief'")
-        if calibrated and envs.unwrapped.autoreset_mode == AutoresetMode.SAME_STEP:
+    def __init__(self, envs: gym.vector.VectorEnv, scaled: bool = True, calibrated: bool = False) -> None:
+        if native(envs).interface.reward_space is not None:
+            raise ValueError("reward 'vector': learners need one number, 'error' or 'belief'")
+        if calibrated and native(envs).autoreset_mode == AutoresetMode.SAME_STEP:
             raise ValueError("calibrated=True needs autoreset_mode Disabled or NextStep")
         super().__init__(envs)
         self._scaled, self._calibrated = scaled, calibrated
         # Sums of true errors, and of what the rewards took for them, by width; at first they agree.
-        self._errors = np.full((2, len(WIDTHS)), HARDLY_ANYTHING_M)
+        self._errors = np.full((2, len(WIDTHS)), PRIOR_M)
 
-    def step(self, actions):
+    def step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """One period; the rewards are float32 copies."""
-        scenario, lam = self.unwrapped.scenario, self.unwrapped.lam.copy()
+        scenario, lam = native(self).scenario, native(self).lam.copy()
         observations, rewards, terminated, truncated, info = self.env.step(actions)
         if self._calibrated:
             rewards = rewards + (self._ratio(info, scenario) - 1.0) * info["reward_error"]
         scale = scenario.typical_cost(lam) if self._scaled else 1.0
         return observations, (rewards / scale).astype(np.float32), terminated, truncated, info
 
-    def _ratio(self, info: dict, scenario) -> np.ndarray:
+    def _ratio(self, info: dict[str, Any], scenario: Scenario) -> np.ndarray:
         """(B,) true over believed errors, after those of this period. Rows that only begin have neither."""
         width = np.log2(np.maximum(info["posterior_rms_m"] / scenario.typical_error_m, 1e-9))
         nearest = abs(WIDTHS[:, None] - width).argmin(axis=0)

@@ -13,7 +13,7 @@ from math import ceil
 
 import numpy as np
 
-from wsn_env.evaluation.policies import make_policy
+from wsn_env.evaluation.policies import Policy, make_policy
 from wsn_env.evaluation.progress import Progress
 from wsn_env.evaluation.rollout import BLOCK, FIRST_SEED, episodes
 from wsn_env.models.state import PURPOSES
@@ -109,7 +109,7 @@ def play_all(trials: Iterable[Trial], progress: Progress) -> dict[Trial, Record]
     for trial in trials:
         what = f"{trial.policy}, {trial.scenario.tracking.tracker}, {trial.scenario.field.nodes} nodes"
 
-        def tick(what=what):
+        def tick(what: str = what) -> None:
             nonlocal done
             done += 1
             progress(done, total, what)
@@ -118,7 +118,7 @@ def play_all(trials: Iterable[Trial], progress: Progress) -> dict[Trial, Record]
     return records
 
 
-def _play_block(world: World, policy, runs: range, tick) -> tuple[np.ndarray, ...]:
+def _play_block(world: World, policy: Policy, runs: range, tick: Callable[[], None]) -> tuple[np.ndarray, ...]:
     periods = []
     for _, outcome in episodes(policy, world, [FIRST_SEED + run for run in runs]):
         energy, reports = (outcome.energy_mj, 1e3 * outcome.energy_j), (outcome.detections, outcome.delivered)

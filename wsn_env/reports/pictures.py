@@ -6,8 +6,12 @@ import base64
 import io
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from wsn_env.evaluation.files import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 NEEDED = "pictures need matplotlib: pip install 'wsn_env[plot]'"
 
@@ -17,18 +21,18 @@ def can_draw() -> bool:
     return find_spec("matplotlib") is not None
 
 
-def plain(text: str) -> str:
+def escape_label(text: str) -> str:
     """A label that matplotlib shows as it is: dollars begin no formula, an underscore at the start hides nothing."""
     return (" " if text.startswith("_") else "") + text.replace("$", r"\$")
 
 
-def write_picture(path: str | Path, figure, dpi: int = 140) -> None:
+def write_picture(path: str | Path, figure: Figure, dpi: int = 140) -> None:
     """A figure as PNG, whole or not at all."""
     with replacing(path) as temporary:
         figure.savefig(temporary, format="png", dpi=dpi)
 
 
-def picture_address(figure) -> str:
+def svg_data_url(figure: Figure) -> str:
     """A figure as an SVG inside its own address, for the src of an image; the same figure gives the same text."""
     from matplotlib import rc_context
 

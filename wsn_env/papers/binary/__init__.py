@@ -29,22 +29,23 @@ from __future__ import annotations
 from pathlib import Path
 
 from wsn_env.evaluation.progress import Progress, progress_bar
-from wsn_env.papers import report
 from wsn_env.papers.binary import figures
 from wsn_env.papers.binary.claims import Study, claims, expected
 from wsn_env.papers.binary.systems import play_paper
+from wsn_env.papers.claim import write_and_print_claims
+from wsn_env.papers.sheet import prepare_folder, print_sheet
 
 
 def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
     """Play the paper's experiments, write every file to `out` and print tables, claims and expected figures."""
-    report.prepare(out)
+    prepare_folder(out)
     with progress_bar(progress) as show:
         results = play_paper(runs, show)
     study = Study(results)
-    judged, known = claims(study), expected(study)
+    judged, expectations = claims(study), expected(study)
     figures.write(out, study)
-    report.print_sheet("Systems", figures.systems(results), f"{runs} runs, 15 to 40 s")
-    report.print_sheet("Readings", figures.readings(study), "fixes with the true velocity, well conditioned")
+    print_sheet("Systems", figures.systems(results), f"{runs} runs, 15 to 40 s")
+    print_sheet("Readings", figures.readings(study), "fixes with the true velocity, well conditioned")
     caption = "flip: misread states; packet_success: of the only try of a report"
-    report.print_sheet("Faults", figures.faults(results), caption)
-    report.conclude(out, judged, known)
+    print_sheet("Faults", figures.faults(results), caption)
+    write_and_print_claims(out, judged, expectations)

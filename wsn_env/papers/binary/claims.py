@@ -5,7 +5,8 @@ A difference counts when it exceeds two standard errors over the runs; differenc
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from wsn_env.papers.binary.readings import (
     take_snapshots,
 )
 from wsn_env.papers.binary.systems import FLIP, NODES, PERIODS_S, RADII_M, Results, Setting
-from wsn_env.papers.report import HOLDS, NOT_REPRODUCED, Claim, Expectation, verdict
+from wsn_env.papers.claim import HOLDS, NOT_REPRODUCED, Claim, Expectation, verdict
 from wsn_env.papers.rollout import exceeds, keeps_falling, pooled_rms, standard_error
 
 DOUBT = 4.0  # standard errors that a figure of a sweep may be off
@@ -59,11 +60,11 @@ REPORTERS = {"boundary nodes": "raw", "detecting nodes": "centroid"}
 class Study:
     """The systems that were played, and the readings that were tried beside them."""
 
-    def __init__(self, results: Results):
-        self.results = results
+    def __init__(self, results: Results) -> None:
+        self.results: Results = results
         snapshots: Snapshots = take_snapshots(results.runs)
-        self.offsets = compare_readings(snapshots)
-        self.printed_m = follow_as_printed(snapshots)
+        self.offsets: dict[str, list[np.ndarray]] = compare_readings(snapshots)
+        self.printed_m: np.ndarray = follow_as_printed(snapshots)
 
     def rms_m(self, reading: str) -> tuple[float, float]:
         """RMS of a reading's fixes [m] and its standard error."""
@@ -81,11 +82,11 @@ class Study:
         return float(np.sqrt((self.printed_m**2).mean()))
 
 
-# --- figures known beforehand -------------------------------------------------------------------------------
+# --- figures expected -----------------------------------------------------------------------------------------
 
 
 def expected(study: Study) -> list[Expectation]:
-    """Every figure known beforehand."""
+    """Every expected figure."""
     return [*_closed_forms(), *_defaults(study.results), *_sweeps(study.results), *_readings(study)]
 
 
@@ -117,14 +118,15 @@ def _defaults(results: Results) -> Iterator[Expectation]:
 def _sweeps(results: Results) -> Iterator[Expectation]:
     for table, unit, values, keyword in ((OVER_NODES, "N", NODES, "nodes"), (OVER_RADII, "R", RADII_M, "radius_m")):
         for what, row in table.items():
-            for value, known in zip(values, row, strict=True):
-                setting = Setting(REPORTERS.get(what, what), **{keyword: value})
+            for value, figure in zip(values, row, strict=True):
+                changes: dict[str, Any] = {keyword: value}
+                setting = Setting(REPORTERS.get(what, what), **changes)
                 runs = results.reporting(setting) if what in REPORTERS else results.run_error_m(setting)
                 label = f"ANTNP, {what}" if what in REPORTERS else f"mean error [m] of {what}"
-                yield _with_doubt(f"{label}, {unit} = {value:g}", known, runs.mean(), standard_error(runs))
-    for period_s, known in OVER_PERIODS.items():
+                yield _with_doubt(f"{label}, {unit} = {value:g}", figure, runs.mean(), standard_error(runs))
+    for period_s, figure in OVER_PERIODS.items():
         runs = results.reporting(Setting("paper", period_s=period_s))
-        yield _with_doubt(f"ANTNP, boundary nodes, T = {period_s:g}", known, runs.mean(), standard_error(runs))
+        yield _with_doubt(f"ANTNP, boundary nodes, T = {period_s:g}", figure, runs.mean(), standard_error(runs))
 
 
 def _readings(study: Study) -> Iterator[Expectation]:
@@ -173,7 +175,7 @@ def _fewer_reports(results: Results) -> Claim:
 def _sweep_claims(results: Results) -> Iterator[Claim]:
     for what, values, keyword in (("nodes", NODES, "nodes"), ("range R", RADII_M, "radius_m")):
         errors = {
-            name: [results.run_error_m(Setting(name, **{keyword: value})) for value in values]
+            name: [results.run_error_m(setting) for setting in _settings(name, keyword, values)]
             for name in ("raw", "paper", "centroid")
         }
         ours = "; ".join(f"{name} {_row(runs)}" for name, runs in errors.items()) + " m"
@@ -186,6 +188,11 @@ def _sweep_claims(results: Results) -> Iterator[Claim]:
             ours = f"centroid {_row(errors['centroid'])} m"
             claim = "the centroid degrades as the range R grows"
             yield Claim(claim, "grows (a figure)", ours, verdict(grows, grows))
+
+
+def _settings(system: str, keyword: str, values: Iterable[float]) -> list[Setting]:
+    changes: list[dict[str, Any]] = [{keyword: value} for value in values]
+    return [Setting(system, **change) for change in changes]
 
 
 def _crossing(results: Results) -> Iterator[Claim]:

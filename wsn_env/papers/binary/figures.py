@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,10 +11,13 @@ from wsn_env.envs.rendering.colours import BLACK, BLUE, GREEN, GREY, PURPLE, VER
 from wsn_env.papers.binary.claims import Study
 from wsn_env.papers.binary.readings import boundary_nodes, detecting_nodes
 from wsn_env.papers.binary.systems import FAULTS, NODES, PERIODS_S, RADII_M, SWEPT, SYSTEMS, Results, Setting
-from wsn_env.papers.report import Sheet, by_period, new_axes, write_sheet
+from wsn_env.papers.sheet import Sheet, by_period, new_axes, write_sheet
 from wsn_env.reports.pictures import write_picture
 
-LOOKS = {
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LOOKS: dict[str, tuple[str, dict[str, Any]]] = {
     "centroid": ("centroid", dict(color=VERMILION, linestyle="--")),
     "raw": ("fix, v given", dict(color=GREY, linestyle=":")),
     "paper": ("paper's filter", dict(color=BLACK, linestyle="-")),
@@ -21,7 +25,7 @@ LOOKS = {
     "ekf": ("EKF of ranges", dict(color=GREEN, linestyle="-")),
     "particle": ("particle filter", dict(color=PURPLE, linestyle="--")),
 }
-SWEEPS = {  # file: field of a setting, its values, label
+SWEEPS: dict[str, tuple[str, tuple[float, ...], str]] = {  # file: field of a setting, its values, label
     "nodes": ("nodes", NODES, "number of nodes N"),
     "radius": ("radius_m", RADII_M, "sensing radius R [m]"),
     "period": ("period_s", PERIODS_S, "sampling period T [s]"),
@@ -54,8 +58,10 @@ def systems(results: Results) -> Sheet:
 
 def readings(study: Study) -> Sheet:
     """The readings tried: RMS and bias along the track of fixes with the true velocity."""
-    rows = [(name, study.rms_m(name)[0], study.bias_m(name)[0]) for name in study.offsets]
-    rows.append(("eqs. 12-13 as printed", study.printed_rms_m(), None))
+    rows = [
+        *((name, study.rms_m(name)[0], study.bias_m(name)[0]) for name in study.offsets),
+        ("eqs. 12-13 as printed", study.printed_rms_m(), None),
+    ]
     return Sheet(("reading", "rms_m", "bias_m"), rows)
 
 
@@ -81,7 +87,7 @@ def sweep(results: Results, name: str) -> Sheet:
     field, values, _ = SWEEPS[name]
     rows = []
     for value in values:
-        changes = {field: value}
+        changes: dict[str, Any] = {field: value}
         settings = [Setting(system, **changes) for system in SWEPT]
         errors = [results.error_m(setting) for setting in settings]
         reporting = [results.reporting(Setting(system, **changes)).mean() for system in ("paper", "centroid")]
@@ -102,7 +108,7 @@ def _summary(results: Results, setting: Setting) -> tuple[float, ...]:
 # --- pictures -----------------------------------------------------------------------------------------------
 
 
-def draw_error(sheet: Sheet):
+def draw_error(sheet: Sheet) -> Figure:
     """Error over time."""
     figure, axes = new_axes("Error over time: N = 600, R = 60 m, T = 1 s", "time [s]", "mean error over the runs [m]")
     time, *columns = (np.array(column, dtype=float) for column in zip(*sheet.rows, strict=True))
@@ -113,7 +119,7 @@ def draw_error(sheet: Sheet):
     return figure
 
 
-def draw_sweep(sheet: Sheet, name: str):
+def draw_sweep(sheet: Sheet, name: str) -> Figure:
     """RMS (over periods) or mean error (over nodes and radii) of the systems; the paper's fixes are heavy-tailed."""
     what = "rms" if name == "period" else "mean"
     _, values, label = SWEEPS[name]

@@ -6,6 +6,7 @@ eqs. 9-13 does as printed.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,6 +83,9 @@ def take_snapshots(runs: int) -> Snapshots:
     return Snapshots(state.network.positions, target, squared <= setting.radius_m**2, setting.steady)
 
 
+Pairs = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]  # nodes (n, 2) -> indices i, j of the pairs
+
+
 def all_pairs(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Indices i < j of every pair of the nodes (n, 2)."""
     return np.triu_indices(len(p), 1)
@@ -100,7 +104,7 @@ def pairs_with_first(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 PAIRS = {"all pairs": all_pairs, "consecutive pairs": consecutive_pairs, "one reference node": pairs_with_first}
 
 
-def solve_pairs(p: np.ndarray, pairs=all_pairs) -> tuple[np.ndarray, float]:
+def solve_pairs(p: np.ndarray, pairs: Pairs = all_pairs) -> tuple[np.ndarray, float]:
     """Eqs. 3-8: 2 (p_j - p_i)' x = |p_j|^2 - |p_i|^2 by least squares; the solution (2,) and the condition number.
 
     Differs from the paper: the last row of eq. 6 reads x_n^2 - x_{n-1}^2 + y_n^2 - y_{n-1}^2.
@@ -117,7 +121,7 @@ def compare_readings(snapshots: Snapshots) -> dict[str, list[np.ndarray]]:
     found: dict[str, list[np.ndarray]] = {}
     for run in range(len(snapshots.positions)):
         offsets: dict[str, list[np.ndarray]] = {}
-        for k in np.flatnonzero(snapshots.steady) + 1:
+        for k in (np.flatnonzero(snapshots.steady) + 1).tolist():
             p, entered = snapshots.changed(run, k)
             if len(p) < 4 or solve_pairs(p)[1] > CONDITION:
                 continue
@@ -147,17 +151,17 @@ def follow_as_printed(snapshots: Snapshots) -> np.ndarray:
     f = np.eye(4) + np.diag([1.0, 0.0, 1.0], 1)
     h = np.eye(4)[::2]
     for run, positions in enumerate(snapshots.positions):
-        x, p, track = None, P0 * np.eye(4), []
+        x: np.ndarray | None = None
+        p, track = P0 * np.eye(4), []
         for k in range(1, len(snapshots.steady) + 1):
             x = None if x is None else f @ x
             nodes, within = snapshots.changed(run, k)[0], positions[snapshots.within[run, k]]
+            z: np.ndarray | None = within.mean(axis=0) if len(within) else None
             if len(nodes) >= 4:
                 z = solve_pairs(nodes)[0] + (0.0 if x is None else 0.5 * x[1::2])
-            else:
-                z = within.mean(axis=0) if len(within) else None
-            if x is None and z is not None:
+            if z is not None and x is None:
                 x = np.array([z[0], 0.0, z[1], 0.0])
-            elif z is not None:
+            elif z is not None and x is not None:
                 gain = p @ h.T @ np.linalg.inv(np.eye(2) + h @ p @ h.T)
                 x, p = x + gain @ (z - h @ x), (np.eye(4) - gain @ h) @ p
             track.append(np.full(2, np.nan) if x is None else x[::2])

@@ -32,7 +32,7 @@ from pathlib import Path
 
 from wsn_env.evaluation.progress import Progress, progress_bar
 from wsn_env.filters.fingerprint import training_of
-from wsn_env.papers import report
+from wsn_env.papers.claim import write_and_print_claims
 from wsn_env.papers.grnn import figures
 from wsn_env.papers.grnn.claims import EXPECTED_RMSE_M, claims, expected
 from wsn_env.papers.grnn.pitfalls import pitfalls
@@ -47,12 +47,12 @@ from wsn_env.papers.grnn.systems import (
     play_paper,
     scenario_as_read,
 )
-from wsn_env.papers.report import Sheet
+from wsn_env.papers.sheet import Sheet, prepare_folder, print_sheet, print_table, write_sheet
 
 
 def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
     """Play every comparison, write every file to `out` and print tables, claims and expected figures."""
-    report.prepare(out)
+    prepare_folder(out)
     with progress_bar(progress) as show:
         results = play_paper(runs, show)
     widths = {search: training_of(scenario_as_read("grnn")).best_width(search) for search in ("golden", "foa")}
@@ -67,21 +67,21 @@ def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
         "pitfalls": pitfalls(runs),
     }
     for name, sheet in sheets.items():
-        report.write_sheet(out / f"{name}.csv", sheet)
+        write_sheet(out / f"{name}.csv", sheet)
     figures.write(out, results)
-    judged, known = claims(results, widths), expected(results, widths)
+    judged, expectations = claims(results, widths), expected(results, widths)
     _print(sheets, runs)
-    report.conclude(out, judged, known)
+    write_and_print_claims(out, judged, expectations)
 
 
 def rmse(results: Results) -> Sheet:
     """The main table: root mean square error over all runs and periods, radial and along each axis."""
     rows = []
     for method, expectations in EXPECTED_RMSE_M.items():
-        for period_s, known in zip(PERIODS_S, expectations, strict=True):
+        for period_s, expected_m in zip(PERIODS_S, expectations, strict=True):
             record = results.method(method, period_s)
             along = [record.pooled_rms_m(axis)[0] for axis in (0, 1)]
-            rows.append((method, period_s, known, *record.pooled_rms_m(), *along))
+            rows.append((method, period_s, expected_m, *record.pooled_rms_m(), *along))
     return Sheet(("method", "period_s", "expected_m", "rmse_m", "stderr_m", "rmse_x_m", "rmse_y_m"), rows)
 
 
@@ -105,7 +105,7 @@ def _print(sheets: dict[str, Sheet], runs: int) -> None:
         cells = [row for row in sheets["rmse"].rows if row[0] == method]
         rows.append([METHODS[method]] + [f"{row[3]:.2f} ({row[4]:.2f})" for row in cells])
     caption = f"ring8, 3 dB; RMSE [m] (standard error), {runs} runs"
-    report.print_table("Error against sampling period", ("method", *(f"T = {t:g} s" for t in PERIODS_S)), rows, caption)
+    print_table("Error against sampling period", ("method", *(f"T = {t:g} s" for t in PERIODS_S)), rows, caption)
     titles = {
         "equal_information": "At an equal information rate",
         "poor_start": "The first 5 s",
@@ -113,4 +113,4 @@ def _print(sheets: dict[str, Sheet], runs: int) -> None:
         "pitfalls": "How not to evaluate",
     }
     for name, title in titles.items():
-        report.print_sheet(title, sheets[name])
+        print_sheet(title, sheets[name])

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from wsn_env.papers.claim import Claim, Expectation, verdict
 from wsn_env.papers.grnn.systems import ANCHORS, FILTERS, METHODS, PERIODS_S, Results
-from wsn_env.papers.report import Claim, Expectation, verdict
 from wsn_env.papers.rollout import Record, exceeds
 
 EXPECTED_RMSE_M = {  # from an independent implementation of our reading, at T = .1, .2, .5, 1 s
@@ -33,7 +33,7 @@ ITERATION_SHARE = 0.05  # with a good start iterating changes less
 
 
 def expected(results: Results, widths: dict[str, tuple[float, float, int]]) -> list[Expectation]:
-    """Every figure known beforehand.
+    """Every expected figure.
 
     Args:
         widths: of "golden" and "foa": width [dB], error at the validation points [m], evaluations.

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wsn_env.envs.rendering.colours import BLACK, BLUE, GREEN, GREY, PURPLE, SKY, VERMILION
 from wsn_env.papers.grnn.systems import ANCHORS, EQUAL_INFORMATION, METHODS, PERIODS_S, STARTED, Results
-from wsn_env.papers.report import Sheet, new_axes, write_sheet
+from wsn_env.papers.sheet import Sheet, new_axes, write_sheet
 from wsn_env.reports.pictures import write_picture
 
-LOOKS = {
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LOOKS: dict[str, dict[str, Any]] = {
     "nonlinear_ls": dict(color=GREY, linestyle=":"),
     "grnn": dict(color=VERMILION, linestyle="--"),
     "grnn_kf": dict(color=GREEN, linestyle="-"),
@@ -51,7 +55,7 @@ def tracks(results: Results) -> Sheet:
     return Sheet(("period", *names), [(k + 1, *row) for k, row in enumerate(columns)])
 
 
-def draw_periods(results: Results):
+def draw_periods(results: Results) -> Figure:
     """Error against sampling period, as sampled and at an equal information rate (rmse.csv, equal_information.csv)."""
     figure, axes = new_axes("Error against sampling period, ring8, 3 dB", "sampling period T [s]", "RMSE [m]")
     for method in ("nonlinear_ls", "grnn", "ckf", "ickf", "grnn_kf"):
@@ -70,7 +74,7 @@ def draw_periods(results: Results):
     return figure
 
 
-def draw_start(sheet: Sheet):
+def draw_start(sheet: Sheet) -> Figure:
     """After a poor start."""
     title = "A start in the middle of the field, 0.5 dB"
     figure, axes = new_axes(title, "time [s]", "RMS error over the runs [m]")
@@ -86,7 +90,7 @@ def draw_start(sheet: Sheet):
     return figure
 
 
-def draw_track(sheet: Sheet):
+def draw_track(sheet: Sheet) -> Figure:
     """One run in the field."""
     figure, axes = new_axes("GRNN fixes and their Kalman filter, T = 0.5 s, one run", "x [m]", "y [m]")
     figure.set_size_inches(5.6, 5.6)

@@ -14,7 +14,8 @@ from wsn_env.filters.kalman import constant_velocity
 from wsn_env.filters.linear import LinearModel
 from wsn_env.models.field import fixed_positions
 from wsn_env.papers.grnn.systems import NOISE_DB, scenario_as_read, track
-from wsn_env.papers.report import Sheet
+from wsn_env.papers.sheet import Sheet
+from wsn_env.scenario import Scenario
 
 PERIOD_S, SEED = 1.0, 7
 TRUTH_COV = np.diag([0.25, 0.02, 0.04, 0.01])  # what such programs believe of x, vx, y, vy after the reset
@@ -31,7 +32,7 @@ def pitfalls(runs: int) -> Sheet:
     on_path = FingerprintMap.survey(truth, nodes, model, np.inf, 1, rng)
     cheat = FingerprintNetwork(on_path, honest.width, honest.noise, 0.0)
 
-    def fixes(network, points):
+    def fixes(network: FingerprintNetwork, points: np.ndarray) -> np.ndarray:
         heard = model.expected(points, nodes) + rng.normal(0.0, NOISE_DB, (runs, len(points), len(nodes)))
         located = [network.locate(np.arange(len(nodes)), strengths)[0] for strengths in heard.reshape(-1, len(nodes))]
         return np.reshape(located, (runs, len(points), 2))
@@ -48,7 +49,7 @@ def pitfalls(runs: int) -> Sheet:
     return Sheet(("evaluation", "rmse_m"), rows)
 
 
-def _reset(fixes, states, scenario):
+def _reset(fixes: np.ndarray, states: np.ndarray, scenario: Scenario) -> np.ndarray:
     """A Kalman filter that begins every period at the true state of the one before."""
     transition, noise = constant_velocity(scenario)
     cov = (transition @ TRUTH_COV @ transition.T + noise)[::2, ::2]

@@ -34,7 +34,7 @@ FILTERS = ("grnn_kf", "ekf", "ukf", "ckf", "ickf")
 EQUAL_INFORMATION = ("grnn_kf", "ckf", "ickf")
 STARTED, STARTS = ("ekf", "ckf", "ickf"), ("field", "fix")  # filters compared over starts
 _CORNERS = ((0.0, 0.0), (200.0, 0.0), (0.0, 200.0), (200.0, 200.0))
-ANCHORS = {
+ANCHORS: dict[str, tuple[tuple[float, float], ...]] = {
     "ring8": RING_OF_EIGHT,
     "mix8": _CORNERS + ((60.0, 60.0), (140.0, 60.0), (60.0, 140.0), (140.0, 140.0)),
 }
@@ -44,7 +44,7 @@ DENSITY = 3.0  # m^2/s^3, the filters' white acceleration
 NOISE_DB, PRECISE_DB = 3.0, 0.5
 
 
-def scenario_as_read(tracker: str, period_s: float = 0.5, noise_db: float = NOISE_DB, **changes) -> Scenario:
+def scenario_as_read(tracker: str, period_s: float = 0.5, noise_db: float = NOISE_DB, **changes: object) -> Scenario:
     """The system in our reading: every anchor hears the target everywhere, and filters begin with a fix."""
     reading = dict(
         positions=ANCHORS["ring8"],
@@ -78,8 +78,8 @@ def equal_information_trial(method: str, period_s: float, runs: int) -> Trial:
 def start_trial(method: str, anchors: str, start: str, runs: int) -> Trial:
     """The first seconds with precise strengths, from the middle of the field or from a fix."""
     periods = round(POOR_START_S / 0.5)
-    changes = dict(positions=ANCHORS[anchors], start=start, periods=periods)
-    return Trial("all", scenario_as_read(method, noise_db=PRECISE_DB, **changes), runs)
+    scenario = scenario_as_read(method, noise_db=PRECISE_DB, positions=ANCHORS[anchors], start=start, periods=periods)
+    return Trial("all", scenario, runs)
 
 
 def track(period_s: float) -> np.ndarray:

@@ -37,26 +37,26 @@ from __future__ import annotations
 from pathlib import Path
 
 from wsn_env.evaluation.progress import Progress, progress_bar
-from wsn_env.papers import report
+from wsn_env.papers.claim import write_and_print_claims
 from wsn_env.papers.pre_dc import figures
 from wsn_env.papers.pre_dc.claims import PAPER_RMS_M, claims, expected
 from wsn_env.papers.pre_dc.systems import NODES, SAME_TRACKER, SYSTEMS, Results, play_paper
-from wsn_env.papers.report import Sheet
 from wsn_env.papers.rollout import standard_error
+from wsn_env.papers.sheet import Sheet, prepare_folder, print_table, write_sheet
 
 
 def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
     """Play the paper's experiments, write every file to `out` and print both tables, claims and expected figures."""
-    report.prepare(out)
+    prepare_folder(out)
     with progress_bar(progress) as show:
         results = play_paper(runs, show)
     table, same = table2(results), same_tracker(results)
-    judged, known = claims(results), expected(results)
-    report.write_sheet(out / "table2.csv", table)
-    report.write_sheet(out / "same_tracker.csv", same)
+    judged, expectations = claims(results), expected(results)
+    write_sheet(out / "table2.csv", table)
+    write_sheet(out / "same_tracker.csv", same)
     figures.write(out, results)
     _print(table, same, runs)
-    report.conclude(out, judged, known)
+    write_and_print_claims(out, judged, expectations)
 
 
 def table2(results: Results) -> Sheet:
@@ -86,7 +86,7 @@ def _print(table: Sheet, same: Sheet, runs: int) -> None:
         cells = table.rows[i : i + len(SYSTEMS)]
         rows.append([str(cells[0][0])] + [f"{p or '-'} / {rms:.3f} ({se:.3f})" for _, _, p, rms, se, _ in cells])
     caption = f"mean RMS [m]: paper / ours (standard error); {runs} runs, static {SYSTEMS['static'].runs_factor * runs}"
-    report.print_table("Table 2", ("nodes", *SYSTEMS), rows, caption)
-    rows = [(name, f"{rms:.3f} ({se:.3f})", f"{energy:.4f}") for name, rms, se, energy in same.rows]
+    print_table("Table 2", ("nodes", *SYSTEMS), rows, caption)
+    cells = [(name, f"{rms:.3f} ({se:.3f})", f"{energy:.4f}") for name, rms, se, energy in same.rows]
     caption = "225 nodes, particle filter with pooled fusion for every policy"
-    report.print_table("One tracker for all", ("policy", "RMS [m]", "energy [mJ/period]"), rows, caption)
+    print_table("One tracker for all", ("policy", "RMS [m]", "energy [mJ/period]"), cells, caption)

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from wsn_env.papers.claim import Claim, Expectation, verdict
 from wsn_env.papers.pre_dc.systems import MOTIONS, NODES, PARTICLES, Results
-from wsn_env.papers.report import Claim, Expectation, verdict
 from wsn_env.papers.rollout import Record, exceeds, keeps_falling
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.sensing import detection_probability, joint_detection_probability
@@ -38,7 +38,7 @@ PROBABILITIES = ((8.0, 0.6, 1e-9), (10.0, 0.0812, 5e-5), (12.0, 0.0, 1e-9))  # d
 
 
 def expected(results: Results) -> list[Expectation]:
-    """Every figure known beforehand: p(d), and each cell of Table 2 against our reading's and the paper's."""
+    """Every expected figure: p(d), and each cell of Table 2 against our reading's and the paper's."""
     figures = [
         Expectation(f"p({d:g} m)", p, tolerance, float(detection_probability(d, Scenario())))
         for d, p, tolerance in PROBABILITIES

@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wsn_env.envs.rendering.colours import BLACK, BLUE, DARK, GREEN, GREY, VERMILION
 from wsn_env.models.detection.radius import Detection
 from wsn_env.papers.pre_dc.systems import MOTIONS, PARTICLES, SYSTEMS, Results
-from wsn_env.papers.report import Sheet, by_period, new_axes, tidy, write_sheet
 from wsn_env.papers.rollout import standard_error
+from wsn_env.papers.sheet import Sheet, by_period, new_axes, tidy, write_sheet
 from wsn_env.reports.pictures import write_picture
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.sensing import detection_probability
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 STATIC, EKF, PRE_DC = VERMILION, BLUE, BLACK
-LOOKS = {  # system: label, style of its line
+LOOKS: dict[str, tuple[str, dict[str, Any]]] = {  # system: label, style of its line
     "static": ("static-cluster", dict(color=STATIC, linestyle="--")),
     "ekf": ("EKF, 2 nodes", dict(color=EKF, linestyle="-.")),
     "pre_dc": ("Pre-DC", dict(color=PRE_DC, linestyle="-")),
 }
-TRACKS = {
+TRACKS: dict[str, tuple[str, dict[str, Any]]] = {
     "straight": ("diagonal", dict(color=PRE_DC, linestyle="-")),
     "sine": ("sine", dict(color=EKF, linestyle="--")),
     "circle": ("circle", dict(color=STATIC, linestyle="-.")),
@@ -107,7 +112,7 @@ def error_of_particles(results: Results, axis: int) -> Sheet:
 # --- figures as pictures ------------------------------------------------------------------------------------
 
 
-def draw_detection(sheet: Sheet, detection: Detection):
+def draw_detection(sheet: Sheet, detection: Detection) -> Figure:
     """Fig. 1."""
     title = "Fig. 1 (our reading): probability of detection, eqs. 2-3"
     figure, axes = new_axes(title, "distance d to the target [m]", "p(d)")
@@ -122,14 +127,14 @@ def draw_detection(sheet: Sheet, detection: Detection):
     return figure
 
 
-def draw_error(sheet: Sheet):
+def draw_error(sheet: Sheet) -> Figure:
     """Fig. 3."""
     figure, axes = new_axes("Fig. 3: error of the three systems, 225 nodes", "time [s]", "RMS error over the runs [m]")
     _lines(axes, sheet, LOOKS)
     return figure
 
 
-def draw_energy(sheet: Sheet):
+def draw_energy(sheet: Sheet) -> Figure:
     """Fig. 4."""
     figure, axes = new_axes(
         "Fig. 4: energy of the three systems, 225 nodes", "time [s]", "mean energy of a period [mJ]"
@@ -139,12 +144,12 @@ def draw_energy(sheet: Sheet):
         "ekf": LOOKS["ekf"],
         "pre_dc": LOOKS["pre_dc"],
     }
-    kept = Sheet(sheet.columns[:2] + sheet.columns[3:], [row[:2] + row[3:] for row in sheet.rows])
+    kept = Sheet(sheet.columns[:2] + sheet.columns[3:], [(*row[:2], *row[3:]) for row in sheet.rows])
     _lines(axes, kept, looks)
     return figure
 
 
-def draw_tracks(results: Results):
+def draw_tracks(results: Results) -> Figure:
     """Fig. 5: four fields."""
     from matplotlib.figure import Figure
 
@@ -164,7 +169,7 @@ def draw_tracks(results: Results):
     return figure
 
 
-def draw_error_on_tracks(sheet: Sheet):
+def draw_error_on_tracks(sheet: Sheet) -> Figure:
     """Fig. 6."""
     figure, axes = new_axes(
         "Fig. 6: error of Pre-DC on four tracks, 225 nodes", "time [s]", "RMS error over the runs [m]"
@@ -173,7 +178,7 @@ def draw_error_on_tracks(sheet: Sheet):
     return figure
 
 
-def draw_particles(sheet: Sheet, name: str, number: int):
+def draw_particles(sheet: Sheet, name: str, number: int) -> Figure:
     """Figs. 7-8, with two standard errors on either side."""
     title = f"Fig. {number}: error of Pre-DC in {name}, 225 nodes (bars: two standard errors)"
     figure, axes = new_axes(title, "number of particles", f"RMS error in {name} [m]")
@@ -186,7 +191,7 @@ def draw_particles(sheet: Sheet, name: str, number: int):
     return figure
 
 
-def _lines(axes, sheet: Sheet, looks: dict) -> None:
+def _lines(axes: Axes, sheet: Sheet, looks: dict[str, tuple[str, dict[str, Any]]]) -> None:
     """A line for every column but the first."""
     time, *columns = (np.array(column, dtype=float) for column in zip(*sheet.rows, strict=True))
     for values, (label, style) in zip(columns, looks.values(), strict=True):

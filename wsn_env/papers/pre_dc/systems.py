@@ -23,7 +23,12 @@ READING = dict(
 )
 PARTICLES = (10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000)
 MOTIONS = ("straight", "sine", "circle", "turns")
-SAME_TRACKER = {"pre_dc": (), "centroid": (), "static_cluster": (), "nearest1": (("hysteresis_m", 0.0),)}
+SAME_TRACKER: dict[str, tuple[tuple[str, float], ...]] = {
+    "pre_dc": (),
+    "centroid": (),
+    "static_cluster": (),
+    "nearest1": (("hysteresis_m", 0.0),),
+}
 
 
 @dataclass(frozen=True)
@@ -50,7 +55,7 @@ SYSTEMS = {
 }
 
 
-def scenario_as_read(**changes) -> Scenario:
+def scenario_as_read(**changes: object) -> Scenario:
     """PreDC-v0 in our reading of the paper's experiment, with changes."""
     return Scenario.named("PreDC-v0", **(READING | changes))
 

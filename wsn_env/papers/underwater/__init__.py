@@ -27,7 +27,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from wsn_env.evaluation.progress import Progress, progress_bar
-from wsn_env.papers import report
+from wsn_env.papers.claim import write_and_print_claims
+from wsn_env.papers.sheet import prepare_folder, print_sheet
 from wsn_env.papers.underwater import figures
 from wsn_env.papers.underwater.claims import claims, expected
 from wsn_env.papers.underwater.systems import play_system
@@ -35,12 +36,12 @@ from wsn_env.papers.underwater.systems import play_system
 
 def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
     """Play the experiments, write every file to `out` and print tables, claims and expected figures."""
-    report.prepare(out)
+    prepare_folder(out)
     with progress_bar(progress) as show:
         results = play_system(runs, show)
-    judged, known = claims(results), expected(results)
+    judged, expectations = claims(results), expected(results)
     figures.write(out, results)
-    report.print_sheet("Resampling", figures.resampling(results))
-    report.print_sheet("Thresholds", figures.thresholds(results))
-    report.print_sheet("Hysteresis of the head", figures.hysteresis(results))
-    report.conclude(out, judged, known)
+    print_sheet("Resampling", figures.resampling(results))
+    print_sheet("Thresholds", figures.thresholds(results))
+    print_sheet("Hysteresis of the head", figures.hysteresis(results))
+    write_and_print_claims(out, judged, expectations)

@@ -13,7 +13,7 @@ import numpy as np
 
 from wsn_env.models.acoustics import absorption_db_per_km
 from wsn_env.models.state import PURPOSES
-from wsn_env.papers.report import Claim, Expectation, verdict
+from wsn_env.papers.claim import Claim, Expectation, verdict
 from wsn_env.papers.rollout import Record, exceeds, standard_error
 from wsn_env.papers.underwater.systems import (
     HYSTERESES_DB,
@@ -70,7 +70,7 @@ ENERGY_J = {"sensing": 0.76, "handover": 0.28, "report": 0.97, "broadcast": 0.08
 
 
 def expected(results: Results) -> list[Expectation]:
-    """Every figure known beforehand."""
+    """Every expected figure."""
     figures = [
         Expectation(f"absorption at {khz:g} kHz [dB/km]", alpha, 0.01, absorption_db_per_km(khz))
         for khz, alpha in ABSORPTION
@@ -141,7 +141,7 @@ def _rmse_ratio(results: Results, noise: float, particles: int, handover: str) -
     return spread.pooled_rms_m()[0] / systematic.pooled_rms_m()[0]
 
 
-def _told(record: Record) -> str:
+def _rms_text(record: Record) -> str:
     return f"{record.pooled_rms_m()[0]:.1f} m, {100 * lost(record).mean():.0f} % lost"
 
 
@@ -150,7 +150,7 @@ def _keeps_the_target(results: Results) -> Claim:
     for handover in ("carried", "redrawn"):
         systematic, spread = _pair(results, SMOOTH, 300, handover)
         good[handover] = bool(lost(systematic).mean() >= LOSES and lost(spread).mean() <= KEEPS)
-        parts.append(f"particles {handover}: systematic {_told(systematic)}, spread {_told(spread)}")
+        parts.append(f"particles {handover}: systematic {_rms_text(systematic)}, spread {_rms_text(spread)}")
     what = (
         "The improved resampling keeps the target (at most 3 % of the runs lost) where systematic resampling loses it "
         "(at least 15 %): smooth motion, 300 particles"
@@ -189,7 +189,7 @@ def _does_no_harm(results: Results) -> Claim:
 def _handover_regularises(results: Results) -> Claim:
     carried, redrawn = (results.resampling(SMOOTH, 300, h, "systematic") for h in ("carried", "redrawn"))
     good = exceeds(carried.rms_m(), redrawn.rms_m())
-    ours = f"carried {_told(carried)}; redrawn {_told(redrawn)}"
+    ours = f"carried {_rms_text(carried)}; redrawn {_rms_text(redrawn)}"
     what = (
         "Handing over mean and covariance is itself a regulariser: systematic resampling, smooth motion, 300 particles"
     )

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wsn_env.envs.rendering.colours import BLUE, GREEN, GREY, PURPLE, SKY, VERMILION, YELLOW
 from wsn_env.models.acoustics import absorption_db_per_km, ambient_noise_db
 from wsn_env.models.state import PURPOSES
-from wsn_env.papers.report import Sheet, by_period, new_axes, write_sheet
 from wsn_env.papers.rollout import Record
+from wsn_env.papers.sheet import Sheet, by_period, new_axes, write_sheet
 from wsn_env.papers.underwater.claims import energy_j
 from wsn_env.papers.underwater.systems import (
     HANDOVERS,
@@ -26,8 +27,11 @@ from wsn_env.papers.underwater.systems import (
 from wsn_env.reports.pictures import write_picture
 from wsn_env.scenario import Scenario
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 COLOURS = dict(zip(PURPOSES, (SKY, GREEN, YELLOW, BLUE, PURPLE, GREY), strict=True))
-LOOKS = {
+LOOKS: dict[str, dict[str, Any]] = {
     "systematic": dict(color=VERMILION),
     "spread": dict(color=BLUE),
     "carried": dict(linestyle="-"),
@@ -108,7 +112,7 @@ def _costs(record: Record) -> tuple[float, ...]:
     return record.delivered.mean(), record.energy_mj.mean() / 1e3, *energy_j(record).values()
 
 
-def draw_error(sheet: Sheet):
+def draw_error(sheet: Sheet) -> Figure:
     """How systematic resampling loses the target."""
     figure, axes = new_axes("Smooth motion, 300 particles", "period (5 s)", "mean error over the runs [m]")
     period, *columns = (np.array(column, dtype=float) for column in zip(*sheet.rows, strict=True))
@@ -122,7 +126,7 @@ def draw_error(sheet: Sheet):
     return figure
 
 
-def draw_thresholds(results: Results):
+def draw_thresholds(results: Results) -> Figure:
     """Energy against error."""
     figure, axes = new_axes("Threshold of a report, from 80 to 92 dB", "energy [J per period]", "RMSE [m]")
     for silent, label, colour in ((False, "silence ignored", VERMILION), (True, "silence told", BLUE)):
@@ -137,7 +141,7 @@ def draw_thresholds(results: Results):
     return figure
 
 
-def draw_energy(results: Results):
+def draw_energy(results: Results) -> Figure:
     """Energy of a period by purpose."""
     figure, axes = new_axes("What the energy is for", "threshold [dB]", "energy [J per period]")
     names = [f"{threshold_db:g}" for threshold_db in THRESHOLDS_DB]

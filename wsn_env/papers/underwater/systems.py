@@ -22,7 +22,7 @@ HYSTERESES_DB = (0.0, 3.0, 6.0, 10.0)
 LOST_M, LOST_PERIODS = 100.0, 10  # a run is lost when its mean error over the last ten periods is larger
 
 
-def scenario_as_read(noise: float, particles: int = 300, **changes) -> Scenario:
+def scenario_as_read(noise: float, particles: int = 300, **changes: object) -> Scenario:
     """Underwater-v0 in our reading of the experiment: the filter knows the track's noise, and resamples always.
 
     Args:
@@ -57,14 +57,14 @@ def resampling_trial(noise: float, particles: int, handover: str, resampling: st
 
 def threshold_trial(threshold_db: float, silent: bool, runs: int) -> Trial:
     """A point of the trade-off between reports and error, with or without what silence tells."""
-    changes = dict(threshold_db=threshold_db, silent_information=silent, redraw_on_handover=True)
-    return _trial(scenario_as_read(MIDDLE, **changes), runs)
+    scenario = scenario_as_read(MIDDLE, threshold_db=threshold_db, silent_information=silent, redraw_on_handover=True)
+    return _trial(scenario, runs)
 
 
 def hysteresis_trial(hysteresis_db: float, runs: int) -> Trial:
     """A head that stays unless another node is so much stronger."""
-    changes = dict(silent_information=True, redraw_on_handover=True)
-    return _trial(scenario_as_read(MIDDLE, **changes), runs, hysteresis_db)
+    scenario = scenario_as_read(MIDDLE, silent_information=True, redraw_on_handover=True)
+    return _trial(scenario, runs, hysteresis_db)
 
 
 @dataclass(frozen=True, eq=False)

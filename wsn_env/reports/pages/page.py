@@ -5,23 +5,27 @@ from __future__ import annotations
 import html
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
+from typing import TYPE_CHECKING, Literal
 
-from wsn_env.reports.pictures import picture_address
+from wsn_env.reports.pictures import svg_data_url
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
-def template(name: str) -> str:
+def read_template(name: str) -> str:
     """The text of a file of `templates/`."""
     return (files("wsn_env.reports.pages") / "templates" / name).read_text(encoding="utf-8")
 
 
-def filled(name: str, **parts: str) -> str:
+def fill_template(name: str, **parts: str) -> str:
     """A template, each {{part}} replaced by its HTML. What is put in is not looked at again."""
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], template(name))
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], read_template(name))
 
 
-def whole_page(kind: str, title: str, body: str) -> str:
+def build_page(kind: Literal["replay", "report"], title: str, body: str) -> str:
     """A page with our style.
 
     Args:
@@ -29,10 +33,10 @@ def whole_page(kind: str, title: str, body: str) -> str:
         title: plain text.
         body: HTML.
     """
-    return filled("page.html", kind=kind, title=html.escape(title), style=template("style.css"), body=body)
+    return fill_template("page.html", kind=kind, title=html.escape(title), style=read_template("style.css"), body=body)
 
 
-def script_safe(data) -> str:
+def json_for_script(data: object) -> str:
     """JSON that cannot end the script element that it stands in."""
     return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
@@ -56,16 +60,16 @@ def table(rows: Sequence[Sequence[str]], strong: str | None = None) -> str:
     return f'<div class="wide"><table{kind}>{"".join(lines)}</table></div>'
 
 
-def folded(title: str, *parts: str, open: bool = False) -> str:
+def collapsible(title: str, *parts: str, open: bool = False) -> str:
     """What opens at a click."""
     return f"<details{' open' if open else ''}><summary>{html.escape(title)}</summary>{''.join(parts)}</details>"
 
 
-def values_table(values: dict) -> str:
+def values_table(values: Mapping[str, object]) -> str:
     """Names and values."""
     return table([(k, v if isinstance(v, str) else json.dumps(v, default=str)) for k, v in values.items()])
 
 
-def image(figure, words: str) -> str:
+def image(figure: Figure, words: str) -> str:
     """A matplotlib figure, and what it shows in words."""
-    return f'<img alt="{html.escape(words)}" src="{picture_address(figure)}">'
+    return f'<img alt="{html.escape(words)}" src="{svg_data_url(figure)}">'

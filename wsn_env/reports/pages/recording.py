@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from wsn_env.compiled import draws
 from wsn_env.envs.rendering import colours
@@ -36,7 +37,7 @@ class Episode:
     """What one policy made of an episode; frames[k] is after k periods."""
 
     policy: str
-    frames: list[dict]
+    frames: list[dict[str, object]]
     rms_m: float
     energy_mj: float  # in a period
     total: float  # return
@@ -47,7 +48,7 @@ class Recording:
     """An episode, and what each of some policies made of it."""
 
     episodes: list[Episode]
-    common: dict  # the room, the nodes, the track
+    common: dict[str, object]  # the room, the nodes, the track
 
 
 def record(policies: dict[str, Policy], scenario: Scenario, seed: int) -> Recording:
@@ -79,7 +80,7 @@ def _played(name: str, policy: Policy, world: World, seed: int) -> Episode:
     return Episode(name, frames, float(np.sqrt(np.mean(scored))), float(np.mean(joules)), float(total))
 
 
-def _common(state: State, scenario: Scenario, seed: int) -> dict:
+def _common(state: State, scenario: Scenario, seed: int) -> dict[str, object]:
     width, depth = scenario.field.room_m
     whole = max(width, depth)
     receiver = scenario.radio.receiver
@@ -103,18 +104,18 @@ def _common(state: State, scenario: Scenario, seed: int) -> dict:
     }
 
 
-def _steps(points, whole: float, steps: int = FINE) -> list:
+def _steps(points: ArrayLike, whole: float, steps: int = FINE) -> list[int]:
     """Coordinates [m] as whole steps, x and y in turn."""
     return np.rint(np.asarray(points, float) * (steps / whole)).astype(int).ravel().tolist()
 
 
-def _frame(state: State, outcome: Outcome, scenario: Scenario) -> dict:
+def _frame(state: State, outcome: Outcome, scenario: Scenario) -> dict[str, object]:
     """A period of a batch of one."""
     whole = max(scenario.field.room_m)
     network, belief, reports = state.network, state.belief.row[0], state.reports
     x = state.belief.particles[0]
     shown = slice(0, None, max(1, -(-x.shape[1] // CLOUD)))
-    payers = state.ledger.payer[0, : state.ledger.count[0]]
+    charged = state.ledger.payer[0, : state.ledger.count[0]]
     frame = {
         "mean": _steps(belief["mean"][::2], whole),
         "cov": [float(f"{belief['cov'][i, j]:.3g}") for i, j in ((0, 0), (0, 2), (2, 2))],
@@ -122,7 +123,7 @@ def _frame(state: State, outcome: Outcome, scenario: Scenario) -> dict:
         "head": int(network.head[0]),
         "members": network.members[0, : network.n_members[0]].tolist(),
         "heard": reports.node[0, : reports.count[0]].tolist(),
-        "left_j": [[int(node), float(f"{network.battery[0, node]:.7g}")] for node in payers],
+        "left_j": [[int(node), float(f"{network.battery[0, node]:.7g}")] for node in charged],
         "error": round(float(outcome.error_m[0]), 3),
         "energy": round(float(outcome.energy_mj[0]), 5),
         "awake": int(outcome.members[0]),

@@ -7,7 +7,7 @@ from pathlib import Path
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.policies import Policy
 from wsn_env.models.quantity import ScenarioError
-from wsn_env.reports.pages.page import filled, script_safe, template, whole_page
+from wsn_env.reports.pages.page import build_page, fill_template, json_for_script, read_template
 from wsn_env.reports.pages.recording import Recording, record
 from wsn_env.scenario import Scenario
 
@@ -33,7 +33,7 @@ def replay(policies: dict[str, Policy], scenario: Scenario, seed: int, out: str 
     if seed < 0:
         raise ValueError(f"seed = {seed}: must be at least 0")
     recording = record(policies, scenario, seed)
-    page = whole_page("replay", f"{scenario.name}, seed {seed}", player(recording))
+    page = build_page("replay", f"{scenario.name}, seed {seed}", player(recording))
     Path(out).parent.mkdir(parents=True, exist_ok=True)
     with replacing(out) as path:
         path.write_text(page, encoding="utf-8")
@@ -43,4 +43,4 @@ def replay(policies: dict[str, Policy], scenario: Scenario, seed: int, out: str 
 def player(recording: Recording) -> str:
     """HTML of the player for a page; a page has room for one."""
     data = recording.common | {"episodes": [vars(episode) for episode in recording.episodes]}
-    return filled("player.html", data=script_safe(data), script=template("player.js"))
+    return fill_template("player.html", data=json_for_script(data), script=read_template("player.js"))

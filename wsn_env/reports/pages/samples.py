@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,12 +15,16 @@ from wsn_env.evaluation.rollout import episodes, evaluation_seeds
 from wsn_env.reports.pages.page import image, section
 from wsn_env.reports.pages.recording import record
 from wsn_env.reports.pages.replay_page import player
-from wsn_env.reports.pictures import plain
+from wsn_env.reports.pictures import escape_label
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.world import World
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 SHOWN = 4  # policies in the histograms
 LOOKED_AT = 20  # episodes of the histograms
+Played = dict[str, tuple[np.ndarray, np.ndarray]]  # by policy: every period's error [m] and nodes awake
 
 
 def sample_sections(evaluation: Evaluation, policies: dict[str, Policy], progress: Progress | None = None) -> list[str]:
@@ -56,9 +61,10 @@ def sample_sections(evaluation: Evaluation, policies: dict[str, Policy], progres
     ]
 
 
-def _played(policies: dict[str, Policy], scenario: Scenario, seeds: Sequence[int], progress: Progress | None) -> dict:
+def _played(policies: dict[str, Policy], scenario: Scenario, seeds: Sequence[int], progress: Progress | None) -> Played:
     """By policy, every period's error and how many nodes were awake."""
-    world, played = World(scenario), {}
+    world = World(scenario)
+    played: Played = {}
     for number, (name, policy) in enumerate(policies.items()):
         periods = []
         for period, (_, outcome) in enumerate(episodes(policy, world, seeds), 1):
@@ -66,11 +72,12 @@ def _played(policies: dict[str, Policy], scenario: Scenario, seeds: Sequence[int
             if progress:
                 done = number * scenario.periods + period
                 progress(done, len(policies) * scenario.periods, f"report: {name}")
-        played[name] = [np.concatenate(values) for values in zip(*periods)]
+        errors, awake = zip(*periods)
+        played[name] = np.concatenate(errors), np.concatenate(awake)
     return played
 
 
-def _draw_histograms(played: dict):
+def _draw_histograms(played: Played) -> Figure:
     """Shares of periods, by error and by how many nodes were awake."""
     from matplotlib.figure import Figure
 
@@ -80,9 +87,9 @@ def _draw_histograms(played: dict):
     edges, sizes = np.linspace(0.0, most, 41), np.arange(int(largest) + 3) - 0.5
     for (name, (errors, awake)), colour in zip(played.items(), LINES):
         share = np.histogram(np.minimum(errors, most), edges)[0] / len(errors)
-        left.stairs(100 * share, edges, color=colour, label=plain(name), linewidth=1.5)
+        left.stairs(100 * share, edges, color=colour, label=escape_label(name), linewidth=1.5)
         share = np.histogram(np.minimum(awake, sizes[-2] + 0.5), sizes)[0] / len(awake)
-        right.stairs(100 * share, sizes, color=colour, label=plain(name), linewidth=1.5)
+        right.stairs(100 * share, sizes, color=colour, label=escape_label(name), linewidth=1.5)
     left.set(xlabel="error [m]; last: and more", ylabel="periods [%]")
     right.set(xlabel="nodes awake; last: and more", ylabel="periods [%]")
     right.xaxis.get_major_locator().set_params(integer=True)

@@ -5,19 +5,21 @@ from __future__ import annotations
 import html
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from wsn_env.evaluation.comparison import Evaluation
 from wsn_env.evaluation.files import replacing
-from wsn_env.evaluation.front import Fronts, fronts
+from wsn_env.evaluation.front import Fronts, find_fronts
 from wsn_env.evaluation.policies import Policy
 from wsn_env.evaluation.progress import Progress
 from wsn_env.evaluation.rollout import evaluation_seeds
 from wsn_env.evaluation.versions import versions
-from wsn_env.reports.front import draw_fronts
-from wsn_env.reports.pages.learning import learning_sections
-from wsn_env.reports.pages.page import folded, image, section, table, values_table, whole_page
+from wsn_env.reports.front_plots import draw_fronts
+from wsn_env.reports.pages.learning_curves import learning_sections
+from wsn_env.reports.pages.page import build_page, collapsible, image, section, table, values_table
 from wsn_env.reports.pages.samples import sample_sections
-from wsn_env.reports.tables import about_the_bound, best_in_hindsight, draw_front, table_header, table_rows
+from wsn_env.reports.plots import draw_comparison
+from wsn_env.reports.tables import describe_best_in_hindsight, describe_bound, table_header, table_rows
 
 REPORT_FILE = "report.html"
 NEAR = 6  # policies in the picture of every lam, besides the first
@@ -27,7 +29,7 @@ def write_report(
     folder: str | Path,
     evaluation: Evaluation | None = None,
     policies: dict[str, Policy] | None = None,
-    training: dict | None = None,
+    training: dict[str, Any] | None = None,
     progress: Progress | None = None,
 ) -> Path:
     """Write report.html into a folder.
@@ -35,8 +37,8 @@ def write_report(
     Args:
         folder: of the run or the evaluation; a training's learning curve is read from its progress-*/progress.csv.
         evaluation: left out: the page has no comparison.
-        policies: with an evaluation its policies by name, for histograms and the worst episode. The first is what the
-            others are compared with.
+        policies: those of the evaluation by name, for histograms and the worst episode; left out: neither. The first is
+            what the others are compared with.
         training: settings of the training.
         progress: called with (episodes' periods played, of, what).
 
@@ -48,14 +50,15 @@ def write_report(
     if evaluation is not None:
         names = ", ".join(evaluation.policies[:3]) + (", ..." if len(evaluation.policies) > 3 else "")
         title = f"{evaluation.scenario.name}: {names}"
-        sections = [*_comparison_sections(evaluation), *sections, *sample_sections(evaluation, policies, progress)]
+        samples = sample_sections(evaluation, policies, progress) if policies else []
+        sections = [*_comparison_sections(evaluation), *sections, *samples]
     return save_report(folder, title, [*sections, settings_section(evaluation, training)])
 
 
 def save_report(folder: Path, title: str, sections: Sequence[str]) -> Path:
     """Write report.html, whole or not at all; returns the file."""
     with replacing(folder / REPORT_FILE) as path:
-        path.write_text(whole_page("report", title, "\n".join(sections)), encoding="utf-8")
+        path.write_text(build_page("report", title, "\n".join(sections)), encoding="utf-8")
     return folder / REPORT_FILE
 
 
@@ -67,13 +70,15 @@ def _comparison_sections(evaluation: Evaluation) -> list[str]:
     parts = [
         f"<p>{evaluation.episodes:,} paired episodes of each policy and lam: all meet the same fields, tracks,"
         f" detections and noises. Means with 95 % bootstrap intervals; <i>{html.escape(reference)} minus it</i> is the"
-        f" paired difference of returns. About the bound: {html.escape(about_the_bound(evaluation))}.</p>"
+        f" paired difference of returns. About the bound: {html.escape(describe_bound(evaluation))}.</p>"
     ]
     for lam in evaluation.lams:
         rows = [table_header(evaluation, reference), *table_rows(evaluation, lam, reference)]
-        notes = "".join(f"<p>{html.escape(line)}</p>" for line in best_in_hindsight(evaluation, lam))
-        parts.append(folded(f"lam = {lam:g} m/mJ", table(rows, reference), notes, open=lam == evaluation.middle_lam))
-    figure = draw_front(evaluation, evaluation.middle_lam, emphasis=reference)
+        notes = "".join(f"<p>{html.escape(line)}</p>" for line in describe_best_in_hindsight(evaluation, lam))
+        parts.append(
+            collapsible(f"lam = {lam:g} m/mJ", table(rows, reference), notes, open=lam == evaluation.middle_lam)
+        )
+    figure = draw_comparison(evaluation, evaluation.middle_lam, emphasis=reference)
     pictures = [image(figure, "mean error against energy")]
     if len(evaluation.lams) > 1:
         if len(evaluation.policies) > NEAR + 1:
@@ -87,14 +92,14 @@ def _comparison_sections(evaluation: Evaluation) -> list[str]:
 def _best_fronts(evaluation: Evaluation) -> Fronts:
     """Those of the first policy and of the best."""
     kept = {evaluation.policies[0], *evaluation.ranked(evaluation.middle_lam)[:NEAR]}
-    found = fronts(evaluation)
+    found = find_fronts(evaluation)
     return {name: points for name, points in found.items() if kept & {point.policy for point in points}}
 
 
 # --- settings ---
 
 
-def settings_section(evaluation: Evaluation | None, training: dict | None = None) -> str:
+def settings_section(evaluation: Evaluation | None, training: dict[str, Any] | None = None) -> str:
     """What was asked for, and the versions."""
     parts = []
     if evaluation is not None:
@@ -110,7 +115,7 @@ def settings_section(evaluation: Evaluation | None, training: dict | None = None
         parts_of = {name: values for name, values in scenario.items() if isinstance(values, dict)}
         whole = {name: value for name, value in scenario.items() if name not in (*parts_of, "lam")}
         parts = [values_table(facts)]
-        parts += [folded(name, values_table(values)) for name, values in ({"scenario": whole} | parts_of).items()]
+        parts += [collapsible(name, values_table(values)) for name, values in ({"scenario": whole} | parts_of).items()]
     if training:
-        parts.append(folded("training", values_table(training)))
-    return section("Settings", *parts, folded("versions", values_table(versions())))
+        parts.append(collapsible("training", values_table(training)))
+    return section("Settings", *parts, collapsible("versions", values_table(versions())))

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
-from itertools import chain, pairwise
+from itertools import chain
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from wsn_env.envs.rendering.colours import BLUE
 from wsn_env.reports.pages.page import image, section
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 CURVES = {  # of a training's progress.csv: the mean, its standard error, what it is
     "rollout/episode_rms_m": ("rollout/episode_rms_se_m", "RMS error of an episode [m]"),
@@ -38,9 +42,9 @@ def read_progress(folder: str | Path) -> dict[str, np.ndarray]:
     Of a run that was killed, a line that was cut short is left out, and so is what a resumed one has trained again.
     """
     begins = {int(path.parent.name.partition("-")[2]): path for path in Path(folder).glob("progress-*/progress.csv")}
-    starts = [*sorted(begins), np.inf]
-    rows = []
-    for start, resumed in pairwise(starts):
+    starts = sorted(begins)
+    rows: list[dict[str, float]] = []
+    for start, resumed in zip(starts, [*starts[1:], np.inf]):
         whole, _, _cut_short = begins[start].read_text().rpartition("\n")
         read = [{k: float(value or "nan") for k, value in row.items()} for row in csv.DictReader(whole.splitlines())]
         rows += [row for row in read if row.get(STEPS, np.nan) <= resumed]
@@ -48,19 +52,19 @@ def read_progress(folder: str | Path) -> dict[str, np.ndarray]:
     return {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
 
 
-def _draw_curves(steps, progress: dict[str, np.ndarray], names: Sequence[str]):
+def _draw_curves(steps: np.ndarray, progress: dict[str, np.ndarray], names: Sequence[str]) -> Figure:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(4.5 * len(names), 3.4), layout="constrained")
     for axes, name in zip(np.atleast_1d(figure.subplots(1, len(names))), names):
         error, what = CURVES[name]
-        known = np.isfinite(progress[name])
-        marker = "o" if known.sum() < FEW else None
-        axes.plot(steps[known], progress[name][known], color=BLUE, linewidth=1.5, marker=marker)
+        finite = np.isfinite(progress[name])
+        marker = "o" if finite.sum() < FEW else None
+        axes.plot(steps[finite], progress[name][finite], color=BLUE, linewidth=1.5, marker=marker)
         if error in progress:
-            half = NORMAL_95 * progress[error][known]
-            ends = progress[name][known] - half, progress[name][known] + half
-            axes.fill_between(steps[known], *ends, color=BLUE, alpha=0.25, linewidth=0)
+            half = NORMAL_95 * progress[error][finite]
+            ends = progress[name][finite] - half, progress[name][finite] + half
+            axes.fill_between(steps[finite], *ends, color=BLUE, alpha=0.25, linewidth=0)
         axes.set(xlabel="periods of training", ylabel=what)
         axes.xaxis.set_major_formatter(lambda value, _: f"{value / 1e6:g} M" if value >= 1e5 else f"{value:,.0f}")
         axes.xaxis.get_major_locator().set_params(nbins=5)

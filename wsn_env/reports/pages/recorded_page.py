@@ -6,13 +6,14 @@ import html
 from collections.abc import Sequence
 from pathlib import Path
 
-from wsn_env.bluetooth.recorded_evaluation import RecordedEvaluation, about_the_tracks, draw_recorded, of_track, remarks
-from wsn_env.bluetooth.recorded_evaluation import table as table_of_tracks
+from wsn_env.bluetooth.recorded_evaluation import RecordedEvaluation, insert_track_name
 from wsn_env.evaluation.policies import named_policies
 from wsn_env.evaluation.progress import Progress
-from wsn_env.reports.pages.page import folded, image, section, table
-from wsn_env.reports.pages.report_page import save_report, settings_section
+from wsn_env.reports.pages.evaluation_page import save_report, settings_section
+from wsn_env.reports.pages.page import collapsible, image, section, table
 from wsn_env.reports.pages.samples import sample_sections
+from wsn_env.reports.recorded_plots import draw_recorded
+from wsn_env.reports.recorded_tables import compare_at_equal_energy, recorded_rows
 
 
 def write_recorded_report(
@@ -34,15 +35,17 @@ def write_recorded_report(
     hardest = list(evaluation.by_track)[rms_m.argmax()]
     of_hardest = evaluation.by_track[hardest]
     about = (
-        f"{about_the_tracks(evaluation)}. Means over the tracks, with the sd over seeds of that mean; e²/trace: squared"
+        f"{evaluation.description}. Means over the tracks, with the sd over seeds of that mean; e²/trace: squared"
         " error over what the belief takes it to be. Each track's RMS stands under its name."
     )
     tables = []
     for lam in evaluation.first.lams:
-        header, rows = table_of_tracks(evaluation, lam)
-        notes = "".join(f"<p>{html.escape(line)}</p>" for line in remarks(evaluation, lam))
-        tables.append(folded(f"lam = {lam:g} m/mJ", table([header, *rows], strong=first), notes, open=lam == middle))
-    named = named_policies(of_track(policies, hardest), of_hardest.scenario)
+        header, rows = recorded_rows(evaluation, lam)
+        notes = "".join(f"<p>{html.escape(line)}</p>" for line in compare_at_equal_energy(evaluation, lam))
+        tables.append(
+            collapsible(f"lam = {lam:g} m/mJ", table([header, *rows], strong=first), notes, open=lam == middle)
+        )
+    named = named_policies(insert_track_name(policies, hardest), of_hardest.scenario)
     sections = [
         section("Comparison", f"<p>{about}</p>", *tables),
         section("Error against energy", image(draw_recorded(evaluation), "RMS error against energy")),

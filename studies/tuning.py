@@ -1,4 +1,4 @@
-"""python -m wsn_env.learning.tuning: find the hand-written rules' parameters anew, on episodes that no comparison uses.
+"""python -m studies.tuning: find the hand-written rules' parameters anew, on episodes that no comparison uses.
 
 Name the lams that suit a scenario: `--scenario Binary-v0 --lams 0.833 1.67 3.33 6.67 13.3 26.7`. Distances are tried
 as shares of the sensing radius. What is best for each lam goes to agents/tuned.json. Every policy that is tried plays
@@ -11,14 +11,15 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import tyro
-
 from wsn_env.agents.adaptive import RULES, Adaptive, Switch
 from wsn_env.agents.greedy import Greedy, Terms
 from wsn_env.agents.nearest import ORDERS, Nearest
 from wsn_env.agents.tuned import TABLE
+
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.policies import Policy
 from wsn_env.evaluation.progress import Progress, progress_bar
@@ -67,9 +68,9 @@ class Trials:
             what: for the progress bar.
             played_at: the lam that each policy sees, whatever it is compared at; None: the first.
         """
-        seen = [self.lams[0]] * len(policies) if played_at is None else played_at
+        played_lams = [self.lams[0]] * len(policies) if played_at is None else played_at
         rows = []
-        for done, (policy, lam) in enumerate(zip(policies, seen, strict=True)):
+        for done, (policy, lam) in enumerate(zip(policies, played_lams, strict=True)):
             rows.append(self._play(policy, float(lam)))
             self._progress(done + 1, len(policies), f"{self.scenario.name}, {what}")
         return np.array(rows)
@@ -85,9 +86,9 @@ class Trials:
         return self._costs[key]
 
 
-def tune(trials: Trials) -> dict:
+def tune(trials: Trials) -> dict[str, Any]:
     """What the table says of a scenario."""
-    found: dict = {}
+    found: dict[str, Any] = {}
     for order in ORDERS:
         found[order] = tune_fixed(trials, order)
         found[RULES[order]] = tune_adaptive(trials, order, found[order])

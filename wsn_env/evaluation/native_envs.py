@@ -1,0 +1,46 @@
+"""The native vector environment behind Gymnasium's wrappers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol, cast
+
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+
+if TYPE_CHECKING:
+    from wsn_env.envs.interface import Interface
+    from wsn_env.scenario import Scenario
+
+
+class NativeEnvs(Protocol):
+    """What a ClusterVectorEnv has beyond Gymnasium's interface.
+
+    A ConcatVectorEnv has neither scenario nor interface.
+    """
+
+    num_envs: int
+    autoreset_mode: AutoresetMode
+
+    @property
+    def lam(self) -> np.ndarray:
+        """(B,) the present episodes' trade-offs [m/mJ]."""
+        ...
+
+    @property
+    def scenario(self) -> Scenario:
+        """What its environments are."""
+        ...
+
+    @property
+    def interface(self) -> Interface:
+        """Its actions, observations and rewards."""
+        ...
+
+    def action_masks(self) -> np.ndarray:
+        """(B, n) bool: which parts of each environment's action make sense now."""
+        ...
+
+
+def native(envs: VectorEnv) -> NativeEnvs:
+    """What wrappers stand around."""
+    return cast(NativeEnvs, envs.unwrapped)

@@ -1,0 +1,96 @@
+"""Claims of a paper and figures expected of our reading: how they are judged, written and printed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from rich.markup import escape
+from rich.table import Table
+
+from wsn_env.papers.sheet import Sheet, write_sheet
+from wsn_env.reports.tables import wide_console
+
+Verdict = Literal["holds", "holds under a stated reading", "not reproduced"]
+HOLDS: Verdict = "holds"
+UNDER_READING: Verdict = "holds under a stated reading"
+NOT_REPRODUCED: Verdict = "not reproduced"
+COLOURS: dict[Verdict, str] = {HOLDS: "green", UNDER_READING: "yellow", NOT_REPRODUCED: "red"}
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim of the paper beside what we measured."""
+
+    claim: str
+    paper: str
+    ours: str
+    verdict: Verdict
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """An expected figure, with the absolute tolerance that it must be met with."""
+
+    quantity: str
+    expected: float
+    tolerance: float
+    measured: float
+
+    @property
+    def within(self) -> bool:
+        return bool(abs(self.measured - self.expected) <= self.tolerance)
+
+
+def verdict(plainly: bool, under_reading: bool) -> Verdict:
+    """Judge a claim.
+
+    Args:
+        plainly: it holds even without the reading that favours it.
+        under_reading: it holds in the reading that the paper's module states.
+    """
+    if not under_reading:
+        return NOT_REPRODUCED
+    return HOLDS if plainly else UNDER_READING
+
+
+def write_and_print_claims(out: Path, claims: Sequence[Claim], expected: Sequence[Expectation]) -> None:
+    """Write claims.csv and expected.csv to the folder and print both, after all else."""
+    write_claims(out / "claims.csv", claims)
+    write_expected(out / "expected.csv", expected)
+    print_claims(claims)
+    print_expected(expected)
+    print(f"written: {out}")
+
+
+def write_claims(path: Path, claims: Iterable[Claim]) -> None:
+    """claims.csv: claim, paper, ours, verdict."""
+    rows = [(c.claim, c.paper, c.ours, c.verdict) for c in claims]
+    write_sheet(path, Sheet(("claim", "paper", "ours", "verdict"), rows))
+
+
+def write_expected(path: Path, expected: Iterable[Expectation]) -> None:
+    """expected.csv: quantity, expected, tolerance, measured, within."""
+    rows = [(e.quantity, e.expected, e.tolerance, e.measured, e.within) for e in expected]
+    write_sheet(path, Sheet(("quantity", "expected", "tolerance", "measured", "within"), rows))
+
+
+def print_claims(claims: Iterable[Claim]) -> None:
+    """The claims with their verdicts in colour."""
+    table = Table(title="Claims", title_justify="left", show_lines=True)
+    for column in ("claim", "paper", "ours", "verdict"):
+        table.add_column(column)
+    for c in claims:
+        table.add_row(escape(c.claim), escape(c.paper), escape(c.ours), f"[{COLOURS[c.verdict]}]{c.verdict}[/]")
+    wide_console().print(table)
+
+
+def print_expected(expected: Sequence[Expectation]) -> None:
+    """How many expected figures were met, and each that was not."""
+    missed = [e for e in expected if not e.within]
+    wide_console().print(f"Expected figures: {len(expected) - len(missed)} of {len(expected)} within their tolerance.")
+    for e in missed:
+        text = f"  missed: {e.quantity}: {e.measured:.4g}, expected {e.expected:.4g} +- {e.tolerance:.2g}"
+        wide_console().print(escape(text))
