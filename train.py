@@ -23,8 +23,8 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecMonitor
-from wsn_env.agents.ppo import PPOPolicy, save_policy
 
+from wsn_env.agents.ppo import PPOPolicy, save_policy
 from wsn_env.cli import make_scenario
 from wsn_env.envs.features import BELIEF_FEATURES, CANDIDATE_FEATURES
 from wsn_env.envs.interface import Settings

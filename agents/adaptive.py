@@ -8,10 +8,10 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+
 from wsn_env.agents.base import ViewPolicy
 from wsn_env.agents.nearest import check_order, surround, usual_hysteresis_m
 from wsn_env.agents.tuned import nearest_lam, tuned
-
 from wsn_env.models.quantity import check_quantity
 from wsn_env.models.state import Cluster
 from wsn_env.simulation.view import View

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from wsn_env.agents.base import ViewPolicy
 
+from wsn_env.agents.base import ViewPolicy
 from wsn_env.models.state import Cluster
 from wsn_env.simulation.geometry import distances_to
 from wsn_env.simulation.view import View

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+
 from wsn_env.agents.base import ViewPolicy
 from wsn_env.agents.tuned import nearest_lam, tuned
-
 from wsn_env.compiled.kernels import kernel, piece
 from wsn_env.envs.merit import chance_of, gain, price_mj
 from wsn_env.models.field import squared_distance

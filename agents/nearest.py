@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+
 from wsn_env.agents.base import ViewPolicy
 from wsn_env.agents.tuned import tuned
-
 from wsn_env.envs.merit import order_by_merit
 from wsn_env.models.quantity import check_quantity, suggest
 from wsn_env.models.state import Cluster

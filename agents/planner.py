@@ -12,10 +12,10 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+
 from wsn_env.agents.base import ViewPolicy
 from wsn_env.agents.imagined import draw_worlds, imagined_world, place_nodes, rows_of
 from wsn_env.agents.nearest import Nearest
-
 from wsn_env.envs.actions import MENU_MEMBERS, MenuAction
 from wsn_env.envs.rewards import belief_cost
 from wsn_env.evaluation.comparison import evaluate

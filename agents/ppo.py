@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 from gymnasium.spaces import Discrete
-from wsn_env.agents.base import ViewPolicy
 
+from wsn_env.agents.base import ViewPolicy
 from wsn_env.envs.interface import Interface, Settings
 from wsn_env.evaluation.files import replacing
 from wsn_env.learning.network import Network

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from wsn_env.agents.base import ViewPolicy
-
 from wsn_env.models.state import Cluster
 from wsn_env.simulation.view import View
 

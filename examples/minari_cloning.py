@@ -18,9 +18,9 @@ import torch
 import tyro
 from closing import ENV, FIELD, Example
 from stable_baselines3 import PPO
-from wsn_env.agents.pre_dc import PreDC
 
 from wsn_env import score
+from wsn_env.agents.pre_dc import PreDC
 from wsn_env.envs.actions import GROUP
 from wsn_env.learning.sb3 import SB3VecEnv
 from wsn_env.learning.training_reward import TrainingReward

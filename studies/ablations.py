@@ -18,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 import tyro
-from wsn_env.agents.ppo import PPOPolicy
 
 from studies.report import draw_curves, save_table
+from wsn_env.agents.ppo import PPOPolicy
 from wsn_env.cli import make_scenario
 from wsn_env.envs.merit import ORDERS
 from wsn_env.evaluation.comparison import evaluate

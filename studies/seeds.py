@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 import tyro
-from wsn_env.agents.ppo import PPOPolicy
 
+from wsn_env.agents.ppo import PPOPolicy
 from wsn_env.cli import make_scenario
 from wsn_env.evaluation.comparison import Evaluation, evaluate
 from wsn_env.evaluation.files import replacing

@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 import tyro
+
 from wsn_env.agents.adaptive import RULES, Adaptive, Switch
 from wsn_env.agents.greedy import Greedy, Terms
 from wsn_env.agents.nearest import ORDERS, Nearest
 from wsn_env.agents.tuned import TABLE
-
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.policies import Policy
 from wsn_env.evaluation.progress import Progress, progress_bar

@@ -1,9 +1,9 @@
 """Eight anchors round a square that hear a target everywhere: the network of the fingerprint system."""
 
 import numpy as np
-from wsn_env.models.sections import Rssi
 
 from wsn_env import Cluster, Scenario, World
+from wsn_env.models.sections import Rssi
 
 RING = ((0, 0), (100, 0), (200, 0), (0, 100), (200, 100), (0, 200), (100, 200), (200, 200))
 

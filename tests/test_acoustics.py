@@ -4,16 +4,16 @@ import math
 
 import numpy as np
 import pytest
-from wsn_env.models.physics.acoustics import absorption_db_per_km, ambient_noise_db
-from wsn_env.models.physics.constants import constants
-from wsn_env.models.physics.sensing import expected_strengths, linearised_strengths
-from wsn_env.models.sections import Sonar
 
 from tests.test_particle import NODES, Filter, moments
 from tests.test_sensing import assert_normal, measured
 from tests.worlds import sensors_of
 from wsn_env import Scenario
 from wsn_env.envs.merit import gain
+from wsn_env.models.physics.acoustics import absorption_db_per_km, ambient_noise_db
+from wsn_env.models.physics.constants import constants
+from wsn_env.models.physics.sensing import expected_strengths, linearised_strengths
+from wsn_env.models.sections import Sonar
 
 ALPHA = 1.18703e-3  # dB/m at 10 kHz
 

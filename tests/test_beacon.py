@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from wsn_env.models.sections import Beacon
 
 from tests.worlds import keys_of
 from wsn_env import Cluster, Scenario, View, World, make_policy
 from wsn_env.envs.env import ClusterEnv
 from wsn_env.models.quantity import ScenarioError
+from wsn_env.models.sections import Beacon
 from wsn_env.models.state import NOBODY, SILENT_DB
 
 QUIET = dict(field_db=0.0, drift_db=0.0, main_db=0.0, main_sd_db=0.0, fade_share=0.0, loss=0.0, loss_after_loss=0.0)

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from wsn_env.models.physics.constants import constants
 
 from wsn_env import Cluster, Scenario, View, World
 from wsn_env.filters.likelihood import weigh_state, weigh_states
+from wsn_env.models.physics.constants import constants
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.scenario.tracking import BOUNDARY_TRACKERS
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from wsn_env.models.physics.field import index, nearest
 
 from wsn_env import Scenario, ScenarioError, World
+from wsn_env.models.physics.field import index, nearest
 from wsn_env.models.state import State
 
 

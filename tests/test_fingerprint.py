@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
-from wsn_env.models.physics.field import fixed_positions
-from wsn_env.models.physics.sensing import expected_strengths
 
 from tests.anchors import RING, everyone, play_subsets, ring_scenario
 from wsn_env import Cluster, Scenario, ScenarioError, World
 from wsn_env.filters.fingerprint import FingerprintMap, FingerprintNetwork, trained_network, training_of
 from wsn_env.filters.kalman import constant_velocity
 from wsn_env.filters.width import fruit_flies, golden_section
+from wsn_env.models.physics.field import fixed_positions
+from wsn_env.models.physics.sensing import expected_strengths
 
 NODES = np.array(RING, float)
 ALL = np.arange(8)

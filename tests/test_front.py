@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from wsn_env.agents.base import ViewPolicy
-from wsn_env.agents.nearest import Nearest
 
 from wsn_env import Scenario, ScenarioError, make_policy
+from wsn_env.agents.base import ViewPolicy
+from wsn_env.agents.nearest import Nearest
 from wsn_env.cli import main
 from wsn_env.evaluation.comparison import evaluate
 from wsn_env.evaluation.front import (

@@ -5,17 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from wsn_env.agents.adaptive import RULES, Adaptive, Switch
-from wsn_env.agents.greedy import Greedy, Terms
-from wsn_env.agents.nearest import ORDERS, Nearest
-from wsn_env.agents.tuned import TABLE, nearest_lam
-from wsn_env.models.physics.constants import constants
-from wsn_env.models.physics.sensing import mean_detection
 
 from studies import tuning
 from tests.test_policies import SCENARIO, chosen, walked
 from wsn_env import Scenario, View, World
+from wsn_env.agents.adaptive import RULES, Adaptive, Switch
+from wsn_env.agents.greedy import Greedy, Terms
+from wsn_env.agents.nearest import ORDERS, Nearest
+from wsn_env.agents.tuned import TABLE, nearest_lam
 from wsn_env.envs.actions import MenuAction
+from wsn_env.models.physics.constants import constants
+from wsn_env.models.physics.sensing import mean_detection
 from wsn_env.models.quantity import ScenarioError
 
 RSSI = Scenario.named("Rssi-v0", particles=200)

@@ -3,9 +3,6 @@
 import numba
 import numpy as np
 import pytest
-from wsn_env.models.physics.constants import constants
-from wsn_env.models.physics.motion import predict_moments
-from wsn_env.models.physics.sensing import detection_probability
 
 from tests.worlds import leaves
 from wsn_env import Scenario, World, make_policy
@@ -13,6 +10,9 @@ from wsn_env.compiled.kernels import fast
 from wsn_env.evaluation.rollout import episodes
 from wsn_env.filters import kernels, likelihood
 from wsn_env.filters.particle import ParticleTracker
+from wsn_env.models.physics.constants import constants
+from wsn_env.models.physics.motion import predict_moments
+from wsn_env.models.physics.sensing import detection_probability
 from wsn_env.models.state import State
 
 NODES = np.array([[40.0, 50.0], [55.0, 45.0], [52.0, 60.0], [47.0, 41.0]])

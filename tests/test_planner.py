@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
-from wsn_env.agents.imagined import GaussianTracker, draw_worlds, imagined_world, place_nodes, rows_of
-from wsn_env.agents.nearest import ORDERS, Nearest
-from wsn_env.agents.planner import Planner, main
-from wsn_env.models.physics.constants import constants
 
 from tests.test_policies import SCENARIO, chosen, walked
 from tests.worlds import sensors_of
 from wsn_env import Scenario, View, World, evaluate
+from wsn_env.agents.imagined import GaussianTracker, draw_worlds, imagined_world, place_nodes, rows_of
+from wsn_env.agents.nearest import ORDERS, Nearest
+from wsn_env.agents.planner import Planner, main
 from wsn_env.compiled import draws
 from wsn_env.envs.merit import gain
+from wsn_env.models.physics.constants import constants
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.models.state import KEEP_CLUSTER
 from wsn_env.scenario import PRESETS

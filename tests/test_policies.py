@@ -7,18 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
+from wsn_env import Scenario, View, World, evaluate, make_policy
 from wsn_env.agents.base import ViewPolicy
 from wsn_env.agents.boundary import Boundary
 from wsn_env.agents.nearest import Nearest
 from wsn_env.agents.pre_dc import PreDC
 from wsn_env.agents.strongest_signal import StrongestSignal
-from wsn_env.models.physics.sensing import detection_probability
-
-from wsn_env import Scenario, View, World, evaluate, make_policy
 from wsn_env.cli import main
 from wsn_env.compiled import draws
 from wsn_env.evaluation.kept_blocks import BLOCKS_FILE
 from wsn_env.evaluation.policies import named_policies, policy_names
+from wsn_env.models.physics.sensing import detection_probability
 from wsn_env.models.state import Cluster
 
 SCENARIO = Scenario.named("PreDC-v0", particles=200)
@@ -49,7 +49,8 @@ def test_every_name_is_an_entry_point():
     assert expected <= set(policy_names())
     for name, n, order in (("nearest4", 4, "nearest"), ("informed12", 12, "information")):
         made = make_policy(name, SCENARIO)
-        assert (made.n, made.order) == (n, order) and made == make_policy(f"{name.rstrip('0123456789')}:n={n}", SCENARIO)
+        assert (made.n, made.order) == (n, order)
+        assert made == make_policy(f"{name.rstrip('0123456789')}:n={n}", SCENARIO)
     with pytest.raises(ValueError, match="did you mean pre_dc"):
         make_policy("predc", SCENARIO)
 

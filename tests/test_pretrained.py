@@ -5,9 +5,9 @@ import re
 from pathlib import Path
 
 import pytest
-from wsn_env.agents.ppo import PRETRAINED
 
 from wsn_env import Scenario, make_policy
+from wsn_env.agents.ppo import PRETRAINED
 from wsn_env.evaluation.comparison import evaluate
 
 DOCS = Path(__file__).parents[1] / "docs"

@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from wsn_env.models.physics.constants import constants
-from wsn_env.models.physics.sensing import mean_detection
 
 from wsn_env import Scenario, View, World
 from wsn_env.compiled import draws
@@ -11,6 +9,8 @@ from wsn_env.envs.actions import MENU_ENTRIES
 from wsn_env.envs.features import BELIEF_FEATURES
 from wsn_env.envs.interface import Interface, Settings
 from wsn_env.envs.prospects import ENTRY_FEATURES
+from wsn_env.models.physics.constants import constants
+from wsn_env.models.physics.sensing import mean_detection
 
 ROWS = 4000
 ENTRIES = (0, 1, 3, 6, 10, 12, 15, 19, 22)  # as it is; head kept, moved to the best, moved ahead

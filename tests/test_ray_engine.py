@@ -5,9 +5,9 @@ import pickle
 import signal
 
 import pytest
-from wsn_env.agents.ppo import PPOPolicy
 
 from wsn_env import Scenario, evaluate, make_policy
+from wsn_env.agents.ppo import PPOPolicy
 from wsn_env.cli import main
 from wsn_env.evaluation.ray_engine import on_ray
 from wsn_env.evaluation.rollout import BLOCK

@@ -8,10 +8,10 @@ from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import DummyVecEnv, VecFrameStack
-from wsn_env.agents.base import ViewPolicy
 
 from tests.test_env import same
 from wsn_env import Cluster, ClusterEnv, ClusterVectorEnv, Scenario, make_policy
+from wsn_env.agents.base import ViewPolicy
 from wsn_env.evaluation.comparison import evaluate
 from wsn_env.evaluation.policies import policy_names
 from wsn_env.learning.concat_vector_env import ConcatVectorEnv

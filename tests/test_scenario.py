@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from wsn_env.models.sections import Detection, Field, Motion, Position, Radio, Rssi, Sine, Straight
 
 from wsn_env import Scenario, ScenarioError, World
+from wsn_env.models.sections import Detection, Field, Motion, Position, Radio, Rssi, Sine, Straight
 from wsn_env.scenario.tracking import Tracking
 
 

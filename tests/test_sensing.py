@@ -4,12 +4,12 @@ import numba
 import numpy as np
 import pytest
 from scipy import stats
-from wsn_env.models.physics import sensing
-from wsn_env.models.physics.constants import constants
-from wsn_env.models.sections import Detection
 
 from wsn_env import Cluster, Scenario, World
 from wsn_env.compiled import draws
+from wsn_env.models.physics import sensing
+from wsn_env.models.physics.constants import constants
+from wsn_env.models.sections import Detection
 
 
 def test_detection_probability_with_table_1():

@@ -5,11 +5,11 @@ import sys
 
 import numpy as np
 import pytest
-from wsn_env.agents.ppo import PRETRAINED
 
 from studies import ablations, seeds, transfer
 from studies.report import draw_curves, learning_curve, over_seeds, table
 from wsn_env import Scenario
+from wsn_env.agents.ppo import PRETRAINED
 
 SMALL = "particles=50 nodes=40 side_m=50 crossing_m=20 periods=10".split()
 

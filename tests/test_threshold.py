@@ -4,14 +4,14 @@ import numba
 import numpy as np
 import pytest
 from scipy.stats import norm
-from wsn_env.models.physics.constants import constants
-from wsn_env.models.physics.sensing import detection_probability
-from wsn_env.models.sections import Detection, Position, Rssi, Sonar, Threshold
 
 from tests.test_particle import NODES, Filter
 from wsn_env import Cluster, Scenario, ScenarioError, World
 from wsn_env.compiled.kernels import fast
 from wsn_env.filters import likelihood
+from wsn_env.models.physics.constants import constants
+from wsn_env.models.physics.sensing import detection_probability
+from wsn_env.models.sections import Detection, Position, Rssi, Sonar, Threshold
 
 UNDERWATER = Scenario.named("Underwater-v0")
 ALPHA = 1.18703e-3

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from wsn_env.agents.ppo import PPOPolicy
 
 import train
 from wsn_env import ClusterVectorEnv, Scenario, View, evaluate, make_policy
+from wsn_env.agents.ppo import PPOPolicy
 from wsn_env.cli import parse_overrides
 from wsn_env.learning.actor_critic import network_of
 from wsn_env.learning.network import EntryNetwork, Network

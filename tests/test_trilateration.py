@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
-from wsn_env.models.physics.sensing import expected_strengths
 
 from tests.anchors import RING, everyone, play_subsets, ring_scenario, tell
 from wsn_env import Cluster, Scenario, ScenarioError, World
 from wsn_env.filters.trilateration import squared_ranges, trilaterate
+from wsn_env.models.physics.sensing import expected_strengths
 
 NODES = np.array(RING, float)
 

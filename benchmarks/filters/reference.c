@@ -1,4 +1,4 @@
-/* The particle filter of wsn_env/trackers/kernels.py in C, step by step the same arithmetic. */
+/* The particle filter of wsn_env/filters/kernels.py in C, step by step the same arithmetic. */
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
