@@ -109,7 +109,7 @@ def _gather(head, chosen, sensors, belief, old, awake, lam, part, nodes, c):
     for k in range(size):
         prices[k] = np.inf  # no candidate
         node = nodes[k]
-        if node < 0 or node == head or not in_one_hop(node, head, sensors.positions, c):
+        if node < 0 or node == head or not in_one_hop(node, head, sensors.positions, c.radio):
             continue
         detections[k] = chance_of(sensors, node, mean, cov, c)
         if informs(c.measurement, detections[k]) > LEAST_DETECTION:

@@ -263,32 +263,15 @@ def run_reproduce(command: Reproduce) -> None:
 
 
 def run_compile(command: Compile) -> None:
-    """`wsn compile`: play a little of everything."""
-    from wsn_env.envs.env import ClusterEnv
-    from wsn_env.evaluation.policies import make_policy
-    from wsn_env.evaluation.rollout import episodes, rollout
-    from wsn_env.simulation.view import View
-    from wsn_env.simulation.world import World
+    """`wsn compile`."""
+    from wsn_env.compiled.store import store_folder
+    from wsn_env.evaluation.progress import progress_bar
+    from wsn_env.evaluation.warm_up import compile_everything
 
     started = time.perf_counter()
-    for fast in (False, True):
-        for order in ("nearest", "information"):
-            env = ClusterEnv(
-                particles=20, periods=3, start="search", order=order, fast=fast, render_mode="rgb_array", frame_px=64
-            )
-            env.reset(seed=0)
-            env.step(10)
-            env.render()
-    scenarios = [Scenario.named("PreDC-v0", tracker=tracker) for tracker in ("particle", "snapshot", "ickf")]
-    scenarios.append(Scenario.named("Binary-v0", nodes=20, tracker="boundary"))
-    for tracker in ("grnn", "nonlinear_ls"):
-        scenarios.append(Scenario.named("Rssi-v0", nodes=20, tracker=tracker, field_seed=0))
-    for scenario in (scenario.override(particles=20, periods=2) for scenario in scenarios):
-        for policy in ("pre_dc", "random", "greedy", "informed2"):
-            for state, _ in episodes(make_policy(policy, scenario), World(scenario), [0]):
-                View.from_arrays(View.of(state).as_arrays())
-    rollout(make_policy("nearest2", scenario), World(scenario), [0])  # with its bound
-    print(f"compiled in {time.perf_counter() - started:.0f} s")
+    with progress_bar() as report:
+        count = compile_everything(report)
+    print(f"{count} kernels compiled in {time.perf_counter() - started:.0f} s; they are in {store_folder()}")
 
 
 def make_scenario(name: str, pairs: list[str], tracks: list[Path], **further: object) -> Scenario:

@@ -13,15 +13,26 @@ from typing import Any, Self
 
 import numpy as np
 from llvmlite import ir
-from numba import carray, config, types
-from numba.extending import intrinsic, models, overload, overload_attribute, register_model
+from llvmlite.ir import Constant
+from numba import config, from_dtype, types
+from numba.core import cgutils
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, overload, register_model
 
-RECORD = np.record if config.DISABLE_JIT else np.void  # np.record's fields read as attributes in Python, too
+
+class _Row(np.record):
+    """An element whose fields read as attributes in Python, too, whatever they are called: `row.mean` is a field."""
+
+    def __getattribute__(self, name):
+        if not name.startswith("__") and name in (np.void.__getattribute__(self, "dtype").names or ()):
+            return self[name]
+        return super().__getattribute__(name)
 
 
 def record(members: list) -> np.dtype:
     """A structured type whose fields kernels read as attributes."""
-    return np.dtype((RECORD, np.dtype(members, align=True)))
+    made = np.dtype(members, align=True)
+    return np.dtype((_Row, made)) if config.DISABLE_JIT else made
 
 
 def array(dtype, *axes: str | int) -> Any:
@@ -125,94 +136,75 @@ def _words(cls: type[Arrays]) -> int:
 class _ByAddress(types.Type):
     """A record in compiled code: the address of its words in the handle. A class of its own for each record."""
 
+    places: dict[str, tuple[int, Any]]  # by field: where its words begin, and its compiled type
+
 
 @register_model(_ByAddress)
 class _AddressModel(models.PrimitiveModel):
     def __init__(self, dmm, fe_type):
-        super().__init__(dmm, fe_type, ir.IntType(64))
+        super().__init__(dmm, fe_type, WORD)
 
 
-@intrinsic
-def _pointer(context, address):
-    def generate(context, builder, signature, arguments):
-        return builder.inttoptr(arguments[0], ir.IntType(8).as_pointer())
-
-    return types.voidptr(types.int64), generate
-
-
-@intrinsic
-def _address_of(context, record):
-    def generate(context, builder, signature, arguments):
-        return arguments[0]
-
-    return types.int64(record), generate
-
-
-@intrinsic
-def _word(context, record, place):
-    """Number `place` of a record's words."""
-
-    def generate(context, builder, signature, arguments):
-        words = builder.inttoptr(arguments[0], ir.IntType(64).as_pointer())
-        return builder.load(builder.gep(words, [arguments[1]]))
-
-    return types.int64(record, types.int64), generate
-
+WORD = ir.IntType(64)
 
 _known: dict[type[Arrays], Any] = {}  # the compiled type of each class
 
 
 def _compiled_type(cls: type[Arrays]) -> Any:
     if cls not in _known:
-        own = type(f"{cls.__name__}ByAddress", (_ByAddress,), {})
+        own = type(f"{cls.__name__}ByAddress", (_ByAddress,), {"places": {}})
         register_model(own)(_AddressModel)
-        _known[cls] = own(cls.__qualname__)
         place = 0
         for item in fields(cls):
             about = item.metadata
             if "part" in about:
-                _add_part(own, item.name, _compiled_type(about["part"]), place)
+                own.places[item.name] = place, _compiled_type(about["part"])
                 place += _words(about["part"])
             else:
-                _add_array(own, item.name, about["dtype"], len(about["axes"]), place)
-                place += 1 + len(about["axes"])
+                kind = types.Array(from_dtype(about["dtype"]), len(about["axes"]), "C")
+                own.places[item.name] = place, kind
+                place += 1 + kind.ndim
+        _teach(own)
+        _known[cls] = own(cls.__qualname__)
     return _known[cls]
 
 
-def _add_part(own, name: str, kind, place: int) -> None:
-    cast, offset = _cast_to(kind), 8 * place
+def _teach(own: type[_ByAddress]) -> None:
+    """What the attributes of a record are, and how they are read."""
 
-    @overload_attribute(own, name, inline="never")
-    def attribute(record):
-        return lambda record: cast(_address_of(record) + offset)
+    @infer_getattr
+    class Attributes(AttributeTemplate):
+        key = own
 
+        def generic_resolve(self, kind, name):
+            return own.places[name][1] if name in own.places else None
 
-def _add_array(own, name: str, dtype: np.dtype, dimensions: int, place: int) -> None:
-    a, b, c, d = range(place + 1, place + 5)
-    ways = {
-        1: lambda record: carray(_pointer(_word(record, place)), (_word(record, a),), dtype),
-        2: lambda record: carray(_pointer(_word(record, place)), (_word(record, a), _word(record, b)), dtype),
-        3: lambda record: carray(
-            _pointer(_word(record, place)), (_word(record, a), _word(record, b), _word(record, c)), dtype
-        ),
-        4: lambda record: carray(
-            _pointer(_word(record, place)),
-            (_word(record, a), _word(record, b), _word(record, c), _word(record, d)),
-            dtype,
-        ),
-    }
-    overload_attribute(own, name, jit_options={"_nrt": True})(lambda record: ways[dimensions])
+    @lower_getattr_generic(own)
+    def read(context, builder, kind, address, name):
+        place, of = own.places[name]
+        if isinstance(of, _ByAddress):
+            return builder.add(address, WORD(8 * place))
+        words = builder.inttoptr(address, WORD.as_pointer())
+        numbers = [builder.load(builder.gep(words, [WORD(place + k)])) for k in range(1 + of.ndim)]
+        return _array_at(context, builder, of, numbers[0], numbers[1:])
 
 
-def _cast_to(kind):
-    @intrinsic
-    def cast(context, address):
-        def generate(context, builder, signature, arguments):
-            return arguments[0]
-
-        return kind(types.int64), generate
-
-    return cast
+def _array_at(context, builder, kind, address, lengths):
+    """A C-contiguous array that owns nothing."""
+    made = context.make_array(kind)(context, builder)
+    itemsize = WORD(context.get_abi_sizeof(context.get_data_type(kind.dtype)))
+    steps, stride = [], itemsize
+    for length in reversed(lengths):
+        steps.insert(0, stride)
+        stride = builder.mul(stride, length, flags=["nsw"])
+    size = WORD(1)
+    for length in lengths:
+        size = builder.mul(size, length, flags=["nsw"])
+    made.meminfo, made.parent = Constant(made.meminfo.type, None), Constant(made.parent.type, None)
+    made.nitems, made.itemsize = size, itemsize
+    made.data = builder.inttoptr(address, made.data.type)
+    made.shape, made.strides = cgutils.pack_array(builder, lengths), cgutils.pack_array(builder, steps)
+    return made._getvalue()
 
 
 def opener(cls: type[Arrays]):
@@ -221,14 +213,22 @@ def opener(cls: type[Arrays]):
     Args:
         cls: of the record.
     """
-    cast = _cast_to(_compiled_type(cls))
+    kind = _compiled_type(cls)
+
+    @intrinsic
+    def address_of(context, handle):
+        def generate(context, builder, signature, arguments):
+            words = context.make_array(signature.args[0])(context, builder, arguments[0])
+            return builder.ptrtoint(words.data, WORD)
+
+        return kind(handle), generate
 
     def record_at(handle):
         return handle
 
     @overload(record_at)
     def _(handle):
-        return lambda handle: cast(handle.ctypes.data)
+        return lambda handle: address_of(handle)
 
     record_at.__qualname__ = f"{cls.__name__}_at"
     record_at.__kernel_layout__ = repr(_leaf_types(cls))

@@ -8,7 +8,7 @@ that the compiler can turn them into vector instructions (relative errors below 
 
 import numpy as np
 from llvmlite import ir
-from numba import types
+from numba import config, types
 from numba.extending import intrinsic
 
 from wsn_env.compiled.kernels import inline_piece, lean_piece, piece
@@ -52,6 +52,9 @@ ERFC = (
 
 
 def _bitcast(source, target, llvm_type):
+    if config.DISABLE_JIT:
+        return lambda value: getattr(np, source.name)(value).view(getattr(np, target.name))
+
     @intrinsic
     def cast(context, value):
         def generate(context, builder, signature, arguments):

@@ -69,16 +69,16 @@ class Kernel:
     def __init__(self, function: FunctionType, options: dict):
         functools.update_wrapper(self, function)
         self.py_func, self.targetoptions = function, options
-        self._call = self._first
+        self.call = self._first  # then Numba's own, without a detour through Python
 
     def __call__(self, *arguments):
-        return self._call(*arguments)
+        return self.call(*arguments)
 
     def _first(self, *arguments):
         if numba.config.DISABLE_JIT:
-            self._call = self.py_func
-            return self._call(*arguments)
-        self._call, result = store.open_kernel(self.py_func, self.targetoptions, arguments)
+            self.call = np.errstate(over="ignore")(self.py_func)  # random bits wrap around
+            return self.call(*arguments)
+        self.call, result = store.open_kernel(self.py_func, self.targetoptions, arguments)
         return result
 
     def __reduce__(self):
@@ -108,6 +108,7 @@ def fast(compiled):
     function = compiled.py_func
     named = {name: function.__globals__.get(name) for name in function.__code__.co_names}
     twins = {name: fast(value) for name, value in named.items() if _has_twin(value)}
+    twins |= {name: value.fast_twin for name, value in named.items() if hasattr(value, "fast_twin")}  # by kind
     twin = FunctionType(function.__code__, function.__globals__ | twins, function.__name__, function.__defaults__)
     twin.__qualname__, twin.__module__ = f"{function.__qualname__}_fast", function.__module__
     options = compiled.targetoptions | {"fastmath": FAST}
@@ -135,7 +136,7 @@ def over_rows(kernel, rows: int, threads: int, *arguments) -> int:
     Returns: the sum of what the calls return (rows that they count), 0 for nothing.
     """
     if threads == 1 or rows <= SERIAL_ROWS:
-        return kernel(0, rows, *arguments) or 0
+        return kernel.call(0, rows, *arguments) or 0
     if threads not in _pools:
         _pools[threads] = ThreadPoolExecutor(threads - 1, thread_name_prefix="wsn_env")
     bounds = [rows * i // threads for i in range(threads + 1)]

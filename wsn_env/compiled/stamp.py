@@ -38,6 +38,12 @@ def stamp(*functions, more: object = "") -> str:
     return hashlib.sha256(whole.encode()).hexdigest()[:DIGITS]
 
 
+def options_text(options: dict) -> str:
+    """Options of compilation, alike in every process."""
+    plain = {name: sorted(value) if isinstance(value, (set, frozenset)) else value for name, value in options.items()}
+    return repr(sorted(plain.items()))
+
+
 def plain_function(value) -> FunctionType | None:
     """The Python function behind a compiled one, an intrinsic or a method; None: there is none."""
     for name in ("py_func", "__func__", "__wrapped__"):
@@ -55,7 +61,7 @@ def _contents(function: FunctionType) -> tuple[str, list[FunctionType]]:
         other = plain_function(value)
         if other is not None:
             options = getattr(value, "targetoptions", {})
-            texts.append(f"{name}: {other.__module__}.{other.__qualname__} {sorted(options.items(), key=str)}")
+            texts.append(f"{name}: {other.__module__}.{other.__qualname__} {options_text(options)}")
             others.append(other)
         else:
             texts.append(f"{name} = {_value(value)}")

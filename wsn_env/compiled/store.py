@@ -14,7 +14,6 @@ import atexit
 import hashlib
 import inspect
 import os
-import pickle
 import shutil
 import sys
 import threading
@@ -24,8 +23,9 @@ from types import FunctionType
 
 import numba
 from numba.core import event
+from numba.core.errors import NumbaError
 
-from wsn_env.compiled.stamp import stamp
+from wsn_env.compiled.stamp import options_text, stamp
 
 KEPT = 12  # folders of one kernel: of other versions that may come back
 SUMS = "sums.txt"
@@ -55,7 +55,7 @@ def open_kernel(function: FunctionType, options: dict, arguments: tuple):
     """The compiled function, from the store if it is there, and what it returns for these arguments."""
     with _lock:
         name = f"{function.__module__}.{function.__qualname__}"
-        folder = store_folder() / f"{name}-{stamp(function, more=sorted(options.items(), key=str))}"
+        folder = store_folder() / f"{name}-{stamp(function, more=options_text(options))}"
         try:
             source = _prepare(folder, function)
         except OSError as problem:
@@ -68,7 +68,9 @@ def open_kernel(function: FunctionType, options: dict, arguments: tuple):
         _opened[dispatcher] = name
         try:
             result = dispatcher(*arguments)
-        except (EOFError, pickle.UnpicklingError, ModuleNotFoundError, AttributeError) as problem:
+        except NumbaError:  # the function's own mistake
+            raise
+        except Exception as problem:  # what unpickling a damaged index raises can be anything
             if not _files(folder):
                 raise
             _throw_away(folder, repr(problem))

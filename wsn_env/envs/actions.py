@@ -39,7 +39,7 @@ class MenuAction:
         heads, members = np.empty(rows, np.int64), np.empty((rows, GROUP), np.int32)
         scratch = np.empty((3, *nodes.shape)), np.empty(nodes.shape, np.int64)
         handle = view.knowledge.handle
-        if _read_menu(0, rows, self._constants, self._by, actions, nodes, handle, *scratch, heads, members):
+        if _read_menu.call(0, rows, self._constants, self._by, actions, nodes, handle, *scratch, heads, members):
             raise _refusal(action, self.space)
         return Cluster(heads, members)
 

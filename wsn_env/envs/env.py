@@ -63,7 +63,7 @@ class ClusterEnv(gym.Env):
             self.reward_space, self.reward_dim = self.interface.reward_space, 2
         self._state: State | None = None
         self._view: View | None = None
-        self._lam = 0.0
+        self._lam, self._period = 0.0, 0
         self._squares = 0.0
         self._detections = 0
         self._bound = None if bound_kind(self.scenario) == "none" else Bound(self.scenario)
@@ -74,7 +74,7 @@ class ClusterEnv(gym.Env):
         state = self.world.allocate(1) if self._state is None else self._state
         key = draws.episode_key(self.np_random)
         self._state, outcome = self.world.restart(state, [True], np.array([key]), donate=True)
-        self._lam = self._state.lam.item()
+        self._lam, self._period = self._state.lam.item(), 0
         self._squares = 0.0
         self._detections = 0
         info = self._judge(outcome)[1]
@@ -89,12 +89,13 @@ class ClusterEnv(gym.Env):
         """One period. Returns observation, reward, terminated (never), truncated, info."""
         if self._state is None:
             raise gym.error.ResetNeeded("call reset() before step()")
-        if self._state.period.item() >= self.scenario.periods:
+        if self._period >= self.scenario.periods:
             raise gym.error.ResetNeeded(f"the episode ended after {self.scenario.periods} periods: call reset()")
         cluster = self.interface.action.cluster(_batched(action), self._view)
         self._state, outcome = self.world.step(self._state, cluster, donate=True)
         reward, info = self._judge(outcome)
-        if self._state.period[0] > self.scenario.unscored:
+        self._period += 1
+        if self._period > self.scenario.unscored:
             self._squares += info["error_m"] * info["error_m"]
         self._detections += info["detections"]
         if self._bound is not None:
@@ -102,7 +103,7 @@ class ClusterEnv(gym.Env):
         if self._camera is not None:
             self._camera.add(self._state, outcome)
             self._camera.show(self._state)
-        truncated = self._state.period.item() >= self.scenario.periods
+        truncated = self._period >= self.scenario.periods
         if truncated:
             info["episode_rms_m"] = math.sqrt(self._squares / self.scenario.scored)
             info["antnp"] = self._detections / self.scenario.periods

@@ -58,7 +58,7 @@ def describe_belief(known, b, nodes, distances, c, f):
     m, p, standing = known.belief[b].predicted_mean, known.belief[b].predicted_cov, network.row[b]
     f[:] = 0.0
     f[0] = 0.5 * log(max(row.lam, 1e-3))
-    ex, ey = _describe_ellipse(m, p, c, f)
+    ex, ey = _describe_ellipse(m, p, c.radius_m, f)
     f[9] = 0.2 * row.log_miss
     f[10] = 0.25 * known.reports.count[b]
     if standing.head >= 0:
@@ -70,7 +70,7 @@ def describe_belief(known, b, nodes, distances, c, f):
 
 
 @lean_piece
-def _describe_ellipse(m, p, c, f):
+def _describe_ellipse(m, p, radius_m, f):
     """f[1:9]: the position's ellipse and the velocity. Returns the direction of the velocity."""
     half, off = 0.5 * (p[0, 0] + p[2, 2]), 0.5 * (p[0, 0] - p[2, 2])
     root = np.sqrt(off * off + p[0, 2] * p[0, 2])
@@ -81,8 +81,8 @@ def _describe_ellipse(m, p, c, f):
     c2, s2 = ex * ex - ey * ey, 2.0 * ex * ey
     f[1] = 0.5 * log(major)
     f[2] = 0.5 * log(minor)
-    f[3] = np.sqrt(major) / c.radius_m
-    f[4] = np.sqrt(minor) / c.radius_m
+    f[3] = np.sqrt(major) / radius_m
+    f[4] = np.sqrt(minor) / radius_m
     f[5] = cos2 * c2 + sin2 * s2
     f[6] = sin2 * c2 - cos2 * s2
     f[7] = speed

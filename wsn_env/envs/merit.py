@@ -92,7 +92,7 @@ def price_mj(detection, sensors, node, head, mean, c):
     """
     x, y = mean[0], mean[2]
     if not c.radio.to_head:
-        x, y = outside(mean, c)
+        x, y = outside(mean, c.radio)
     elif head >= 0:
         x, y = sensors.positions[head, 0], sensors.positions[head, 1]
     squared = squared_distance(sensors.positions, node, x, y)

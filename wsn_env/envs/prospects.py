@@ -165,7 +165,7 @@ def _report_j(sensors, node, head, detection, m, c):
     if c.radio.to_head:
         x, y, hearing = sensors.positions[head, 0], sensors.positions[head, 1], reception(c.radio, c.radio.report_bits)
     else:
-        x, y = outside(m, c)
+        x, y = outside(m, c.radio)
         hearing = 0.0
     r = c.radio
     tries = r.delivery / r.packet_success if r.packet_success > 0.0 else float(r.tries)

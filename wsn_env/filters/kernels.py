@@ -161,7 +161,12 @@ def scatter_rows(start, stop, cs, keys, periods, rows, belief_handle):
         if rows[b]:
             stream = draws.stream(keys[b], periods[b], draws.CLOUD)
             scatter_walkers(
-                stream, belief.particles[b], belief.log_weights[b], c.tracking.velocity_sd, c.side_m, c.depth_m
+                stream,
+                belief.particles[b],
+                belief.log_weights[b],
+                c.tracking.velocity_sd,
+                c.tracking.side_m,
+                c.tracking.depth_m,
             )
 
 
@@ -204,7 +209,7 @@ def filter_row(key, period, belief, network, reports, b, c, maps, scratch):
     weights, slots, states = scratch.weights, scratch.slots, scratch.states
     n, count = x.shape[1], reports.count[b]
     if c.tracking.walks:
-        walk(draws.stream(key, period, draws.PROCESS), x, c)
+        walk(draws.stream(key, period, draws.PROCESS), x, c.tracking)
     else:
         predict(draws.stream(key, period, draws.PROCESS), x, c.period_s, c.tracking.q)
     weigh_period(c.measurement, x, log_weights, belief, network, reports, b, c, maps, weights)

@@ -55,7 +55,7 @@ class NonlinearLSTracker(TrilaterationTracker):
 def _fit_point(cs, nodes, strengths, point, cov):
     """Gauss and Newton's iteration from `point` (2,), in place; `cov` (2, 2) is filled with the inverse information."""
     c = cs[0]
-    margin = 0.1 * c.side_m
+    margin = 0.1 * c.tracking.side_m
     for _ in range(NEWTON_STEPS):
         a, b, d, u, v = RIDGE, 0.0, RIDGE, 0.0, 0.0  # the normal equations (a b; b d) step = (u, v)
         for i in range(len(strengths)):
@@ -74,8 +74,8 @@ def _fit_point(cs, nodes, strengths, point, cov):
         x, y = (d * u - b * v) / determinant, (a * v - b * u) / determinant
         length = np.sqrt(x * x + y * y)
         share = margin / max(length, margin)
-        point[0] = min(max(point[0] + share * x, -margin), c.side_m + margin)
-        point[1] = min(max(point[1] + share * y, -margin), c.side_m + margin)
+        point[0] = min(max(point[0] + share * x, -margin), c.tracking.side_m + margin)
+        point[1] = min(max(point[1] + share * y, -margin), c.tracking.side_m + margin)
         if length < NEWTON_END_M:
             break
 

@@ -22,15 +22,15 @@ def scatter_walkers(stream, x, log_weights, sd_ms, side_m, depth_m):
 
 
 @lean_piece
-def walk(stream, x, c):
+def walk(stream, x, t):
     """One period of a walk: v' = a v + sd sqrt(1 - a^2) e, x' = x + T (v + v') / 2, reflected at the walls."""
-    kept = F(c.tracking.velocity_kept)
-    fresh = F(c.tracking.velocity_sd * np.sqrt(1.0 - c.tracking.velocity_kept * c.tracking.velocity_kept))
-    half, rough = F(0.5 * c.period_s), F(ROUGHENING_M)
+    kept = F(t.velocity_kept)
+    fresh = F(t.velocity_sd * np.sqrt(1.0 - t.velocity_kept * t.velocity_kept))
+    half, rough = F(0.5 * t.period_s), F(ROUGHENING_M)
     n = x.shape[1]
     for axis in (0, 2):
         place, velocity = x[axis], x[axis + 1]
-        wall = F(c.side_m if axis == 0 else c.depth_m)
+        wall = F(t.side_m if axis == 0 else t.depth_m)
         for i in range(n):
             e, shift = normal_pair32(draws.bits(stream, axis * n + i))
             before = velocity[i]

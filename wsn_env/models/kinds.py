@@ -45,6 +45,8 @@ class Kind(Section):
             scenario: the Scenario that the kind is part of.
         """
         values = {item.name: getattr(self, item.name) for item in fields(self)}
+        optional = [item.name for item in fields(self) if item.metadata.get("allowed", {}).get("optional")]
+        values |= {name: np.nan for name in optional if values[name] is None}  # the type must not hang on the value
         return {name: value for name, value in values.items() if isinstance(value, (int, float, np.number))}
 
     def check_functions(self) -> None:
@@ -90,12 +92,12 @@ def by_kind(function: Callable) -> Any:
     Args:
         function: of the role, for its name and arguments.
     """
-    dispatching = _dispatcher(function, _strict)
-    dispatching.fast_twin = _dispatcher(function, _fast)
+    dispatching = _dispatcher(function, _strict, function.__name__)
+    dispatching.fast_twin = _dispatcher(function, _fast, f"{function.__name__}_fast")
     return dispatching
 
 
-def _dispatcher(function: Callable, compiled: Callable) -> Any:
+def _dispatcher(function: Callable, compiled: Callable, own_name: str) -> Any:
     name, arguments = function.__name__, ", ".join(inspect.signature(function).parameters)
 
     def choose(constants):
@@ -114,7 +116,7 @@ def _dispatcher(function: Callable, compiled: Callable) -> Any:
     made: dict[str, Any] = {"find": find, "choose": choose}
     exec(source, made)  # noqa: S102  Numba wants the arguments under their own names
     dispatching = made[name]
-    dispatching.__module__, dispatching.__qualname__ = function.__module__, f"by_kind.{name}"
+    dispatching.__module__, dispatching.__qualname__ = function.__module__, f"by_kind.{own_name}"
     dispatching.__doc__ = function.__doc__
     overload(dispatching, jit_options={"error_model": "numpy", "nogil": True, "fastmath": False})(made["typing"])
     return dispatching

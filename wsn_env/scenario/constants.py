@@ -16,6 +16,10 @@ KINDS = ("measurement", "detection", "radio")
 
 TRACKING = record(
     [
+        ("period_s", "f8"),
+        ("side_m", "f8"),
+        ("depth_m", "f8"),
+        ("radius_m", "f8"),
         ("q", "f8"),
         ("walks", "i8"),
         ("velocity_kept", "f8"),  # of a walker's, from period to period
@@ -48,12 +52,17 @@ _made: dict[int, tuple[ref, np.ndarray]] = {}  # by scenario
 def _constants(scenario: Scenario) -> np.ndarray:
     t = scenario.tracking
     types = [(name, constants_type(getattr(scenario, name), scenario)) for name in KINDS]
-    plain = [(name, "f8") for name in ("period_s", "side_m", "depth_m", "radius_m", "reach_m", "ring_m")]
+    plain = [(name, "f8") for name in ("period_s", "radius_m", "reach_m", "ring_m")]
     made = np.zeros(1, record([*types, ("tracking", TRACKING), *plain]))
     for name in KINDS:
         fill_constants(made[name], getattr(scenario, name), scenario)
     walks = t.velocity_s is not None
+    side_m, depth_m = scenario.field.room_m
     tracking = dict(
+        period_s=scenario.period_s,
+        side_m=side_m,
+        depth_m=depth_m,
+        radius_m=scenario.radius_m,
         q=scenario.filter_q,
         walks=walks,
         velocity_kept=1.0 if t.velocity_s is None else math.exp(-scenario.period_s / t.velocity_s),
@@ -70,8 +79,6 @@ def _constants(scenario: Scenario) -> np.ndarray:
     )
     for name, value in tracking.items():
         made["tracking"][name] = value
-    side_m, depth_m = scenario.field.room_m
-    lengths = (scenario.period_s, side_m, depth_m, scenario.radius_m, scenario.reach_m, scenario.ring_m)
-    for (name, _), value in zip(plain, lengths):
+    for (name, _), value in zip(plain, (scenario.period_s, scenario.radius_m, scenario.reach_m, scenario.ring_m)):
         made[name] = value
     return made

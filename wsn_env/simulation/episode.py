@@ -74,7 +74,8 @@ def begin(start, stop, starts, rows, keys, placed, handle):
         if s.high > s.low:
             row.lam = s.low * exp(log(s.high / s.low) * draws.uniform(draws.stream(key, 0, draws.LAM), 0))
         if len(placed) > 0:
-            network.positions[b] = placed
+            for i in range(len(placed)):
+                network.positions[b, i, 0], network.positions[b, i, 1] = placed[i, 0], placed[i, 1]
         else:
             field_stream = draws.stream(s.field_key if s.seeded else key, 0, draws.FIELD)
             if s.grid:
@@ -91,7 +92,8 @@ def begin(start, stop, starts, rows, keys, placed, handle):
         state.reports.bitmap[b] = 0
         belief.n_eff = state.belief.particles.shape[2]
         _first_belief(draws.stream(key, 0, draws.START), state.track[b, 0], s, belief.mean, belief.cov)
-        belief.predicted_mean[:] = belief.mean  # where a first search takes the target to be
+        for axis in range(4):  # where a first search takes the target to be
+            belief.predicted_mean[axis] = belief.mean[axis]
 
 
 class Tracks:

@@ -4,15 +4,18 @@ A radio reaches every node at a price that grows with distance (eq. 5); a modem 
 may be lost and are tried again (assumption d of Xiang & Guo, 2013); control packets always arrive. A sink in the middle
 of the field and the target's own node have energy of their own, so that only the network's side counts: who reports to
 them pays for sending, who is called by them pays for hearing it. All pieces work on row b of the state; `out` is the
-row's record of the period (OUTCOME).
+row's record of the period (OUTCOME), `r` the radio's constants.
 """
+
+import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.kernels import lean_piece
 from wsn_env.models.field import squared_distance
 from wsn_env.models.radio.base import reception, relayed, transmission
 
-SENSING, HANDOVER, INVITATION, REPORT, BROADCAST, SEARCH = range(6)
+# NumPy's numbers: for each of Python's own Numba would compile a function of its own.
+SENSING, HANDOVER, INVITATION, REPORT, BROADCAST, SEARCH = np.arange(6)
 
 
 @lean_piece
@@ -41,38 +44,38 @@ def clear_ledger(ledger, b):
 
 
 @lean_piece
-def in_one_hop(node, other, positions, c):
+def in_one_hop(node, other, positions, r):
     """Whether a packet goes from node to node at once."""
-    return squared_distance(positions, node, positions[other, 0], positions[other, 1]) <= c.radio.hop_m * c.radio.hop_m
+    return squared_distance(positions, node, positions[other, 0], positions[other, 1]) <= r.hop_m * r.hop_m
 
 
 @lean_piece
-def send(sender, receiver, bits, purpose, state, out, b, c):
+def send(sender, receiver, bits, purpose, state, out, b, r):
     """One packet from node to node (eq. 5). Returns whether both could pay, so that it arrived if not lost."""
     positions, battery = state.network.positions[b], state.network.battery[b]
     squared = squared_distance(positions, sender, positions[receiver, 0], positions[receiver, 1])
-    if battery[sender] <= 0.0 or not spend(sender, transmission(c.radio, bits, squared), purpose, state, out, b):
+    if battery[sender] <= 0.0 or not spend(sender, transmission(r, bits, squared), purpose, state, out, b):
         return False
-    return battery[receiver] > 0.0 and spend(receiver, reception(c.radio, bits), purpose, state, out, b)
+    return battery[receiver] > 0.0 and spend(receiver, reception(r, bits), purpose, state, out, b)
 
 
 @lean_piece
-def send_out(sender, x, y, bits, purpose, state, out, b, c):
+def send_out(sender, x, y, bits, purpose, state, out, b, r):
     """One packet from a node to (x, y), out of the network (eq. 5). Returns whether the node could pay."""
     squared = squared_distance(state.network.positions[b], sender, x, y)
     living = state.network.battery[b, sender] > 0.0
-    return living and spend(sender, transmission(c.radio, bits, squared), purpose, state, out, b)
+    return living and spend(sender, transmission(r, bits, squared), purpose, state, out, b)
 
 
 @lean_piece
-def outside(mean, c):
+def outside(mean, r):
     """Where a receiver outside the network stands, as far as the network knows: the sink in the middle of the field,
     the target where it is predicted. (A price of the true way would tell the target's distance through batteries.)"""
-    return (mean[0], mean[2]) if c.radio.to_target else (0.5 * c.side_m, 0.5 * c.depth_m)
+    return (mean[0], mean[2]) if r.to_target else (r.sink_x, r.sink_y)
 
 
 @lean_piece
-def report(node, head, packets, purpose, state, out, b, c):
+def report(node, head, packets, purpose, state, out, b, r):
     """A node's report with its retries. Returns whether it was received; to the head its own is free.
 
     Args:
@@ -81,30 +84,30 @@ def report(node, head, packets, purpose, state, out, b, c):
     Beyond one hop nothing is sent: after a search the new head may lie so far, for a modem.
     """
     positions = state.network.positions[b]
-    if c.radio.to_head:
+    if r.to_head:
         x, y = positions[head, 0], positions[head, 1]
         if state.network.battery[b, head] <= 0.0 or node == head:
             return state.network.battery[b, head] > 0.0
     else:
-        x, y = outside(state.belief.row[b].predicted_mean, c)
-    if squared_distance(positions, node, x, y) > c.radio.hop_m * c.radio.hop_m:
+        x, y = outside(state.belief.row[b].predicted_mean, r)
+    if squared_distance(positions, node, x, y) > r.hop_m * r.hop_m:
         return False
     packet = draws.SEARCH_PACKET if purpose == SEARCH else draws.PACKET
     stream = draws.stream(state.key[b], state.row[b].period, packet)
-    for attempt in range(c.radio.tries):
-        if c.radio.to_head:
-            sent = send(node, head, packets * c.radio.report_bits, purpose, state, out, b, c)
+    for attempt in range(r.tries):
+        if r.to_head:
+            sent = send(node, head, packets * r.report_bits, purpose, state, out, b, r)
         else:
-            sent = send_out(node, x, y, packets * c.radio.report_bits, purpose, state, out, b, c)
+            sent = send_out(node, x, y, packets * r.report_bits, purpose, state, out, b, r)
         if not sent:
             return False
-        if draws.uniform(stream, 16 * node + attempt) < c.radio.packet_success:
+        if draws.uniform(stream, 16 * node + attempt) < r.packet_success:
             return True
     return False
 
 
 @lean_piece
-def broadcast(state, out, b, c):
+def broadcast(state, out, b, r):
     """The head's word to resample: one transmission as far as the farthest living member, who all pay to hear it."""
     network = state.network
     head, nodes, count = network.row[b].head, network.members[b], network.row[b].n_members
@@ -116,38 +119,38 @@ def broadcast(state, out, b, c):
             farthest = max(farthest, squared)
     if farthest < 0.0 or battery[head] <= 0.0:
         return
-    if spend(head, transmission(c.radio, c.radio.broadcast_bits, farthest), BROADCAST, state, out, b):
+    if spend(head, transmission(r, r.broadcast_bits, farthest), BROADCAST, state, out, b):
         for k in range(count):
             if battery[nodes[k]] > 0.0:
-                spend(nodes[k], reception(c.radio, c.radio.broadcast_bits), BROADCAST, state, out, b)
+                spend(np.int64(nodes[k]), reception(r, r.broadcast_bits), BROADCAST, state, out, b)
 
 
 @lean_piece
-def _hand_over(old, head, state, out, b, c):
+def _hand_over(old, head, state, out, b, r):
     """The old head's packet to the new one; beyond one hop it is relayed, and the old head pays for its relays.
 
     Returns: as `send`.
     """
     positions, battery = state.network.positions[b], state.network.battery[b]
     squared = squared_distance(positions, old, positions[head, 0], positions[head, 1])
-    if battery[old] <= 0.0 or not spend(old, relayed(c.radio, c.radio.handover_bits, squared), HANDOVER, state, out, b):
+    if battery[old] <= 0.0 or not spend(old, relayed(r, r.handover_bits, squared), HANDOVER, state, out, b):
         return False
-    return battery[head] > 0.0 and spend(head, reception(c.radio, c.radio.handover_bits), HANDOVER, state, out, b)
+    return battery[head] > 0.0 and spend(head, reception(r, r.handover_bits), HANDOVER, state, out, b)
 
 
 @lean_piece
-def take_over(head, state, out, b, c):
+def take_over(head, state, out, b, r):
     """An awake node leads, alone as yet. Returns whether the head's role was handed over: a sink or the target needs no
     head, so that the node is one like the others there."""
     standing = state.network.row[b]
     old = standing.head
     standing.head = head
     standing.n_members = 0
-    return c.radio.to_head and old >= 0 and old != head and _hand_over(old, head, state, out, b, c)
+    return r.to_head and old >= 0 and old != head and _hand_over(old, head, state, out, b, r)
 
 
 @lean_piece
-def form(head, chosen, count, state, out, b, c):
+def form(head, chosen, count, state, out, b, r):
     """Make the chosen cluster the standing one: handover from the old head, invitations to new members.
 
     Only members that hear their invitation join. A new head invites all of them. A sink or the target calls only who
@@ -161,9 +164,9 @@ def form(head, chosen, count, state, out, b, c):
     """
     standing, members = state.network.row[b], state.network.members[b]
     old, old_count = standing.head, standing.n_members
-    heads_call = c.radio.to_head
-    handed = take_over(head, state, out, b, c)
-    price = reception(c.radio, c.radio.invitation_bits)
+    heads_call = r.to_head
+    handed = take_over(head, state, out, b, r)
+    price = reception(r, r.invitation_bits)
     called = not heads_call and head != old
     for k in range(old_count):
         called &= members[k] != head
@@ -171,12 +174,12 @@ def form(head, chosen, count, state, out, b, c):
         spend(head, price, INVITATION, state, out, b)
     n, j = 0, 0
     for k in range(count):
-        node = chosen[k]
+        node = np.int64(chosen[k])
         while j < old_count and members[j] < node:
             j += 1
         awake = node == old or (j < old_count and members[j] == node)
         if heads_call:
-            joins = (awake and head == old) or send(head, node, c.radio.invitation_bits, INVITATION, state, out, b, c)
+            joins = (awake and head == old) or send(head, node, r.invitation_bits, INVITATION, state, out, b, r)
         else:
             joins = awake or spend(node, price, INVITATION, state, out, b)
         if joins:

@@ -26,7 +26,7 @@ def run(start, stop, cs, maps, heads, chosen, lost, outcomes, handle):
         if c.tracking.redraw and out.handover:
             redraw_row(key, period, state.belief, b)
         resampled = filter_row(key, period, state.belief, state.network, state.reports, b, c, maps, scratch)
-        lost[b] = _conclude(resampled, state, out, b, c)
+        lost[b] = _conclude(resampled, state, out, b, c.radio, c.tracking)
         count += lost[b]
         foretell(c.measurement, state.belief, state.network.positions[b], b, c, maps, scratch.weights)
     return count
@@ -55,7 +55,7 @@ def conclude(start, stop, cs, resampled, lost, outcomes, handle):
     """What comes after it; returns how many rows must search."""
     state, count = state_at(handle), 0
     for b in range(start, stop):
-        lost[b] = _conclude(resampled[b], state, outcomes[b], b, cs[0])
+        lost[b] = _conclude(resampled[b], state, outcomes[b], b, cs[0].radio, cs[0].tracking)
         count += lost[b]
     return count
 
@@ -75,7 +75,7 @@ def _sense_and_report(head, chosen, state, out, b, c):
     """
     network, reports = state.network, state.reports
     messages.clear_ledger(state.ledger, b)
-    _take_choice(head, chosen, state, out, b, c)  # handover, invitations [J]
+    _take_choice(head, chosen, state, out, b, c.radio)  # handover, invitations [J]
     state.row[b].period += 1
     target = target_of(state, b)  # moves
     reports.count[b] = 0
@@ -87,15 +87,15 @@ def _sense_and_report(head, chosen, state, out, b, c):
             place += 1
         for k in range(n + 1):
             node = head if k == place else members[k - (k > place)]
-            if wake(node, messages.SENSING, state, out, b, c):
+            if wake(node, messages.SENSING, state, out, b, c.radio):
                 sense(node, head, messages.REPORT, target, state, out, b, c)
     if c.radio.asleep_j > 0.0:
-        _sleep(state, out, b, c)
+        _sleep(state, out, b, c.radio)
     _remember_miss(state, b, c)
 
 
 @lean_piece
-def _take_choice(head, chosen, state, out, b, c):
+def _take_choice(head, chosen, state, out, b, r):
     """Drop what cannot serve, then form the cluster."""
     network = state.network
     standing, battery, predicted = network.row[b], network.battery[b], state.belief.row[b].predicted_mean
@@ -103,7 +103,7 @@ def _take_choice(head, chosen, state, out, b, c):
     if head == KEEP_CLUSTER and stands:
         out.members = 1 + standing.n_members
         return
-    if head == NOBODY and not c.radio.to_head:
+    if head == NOBODY and not r.to_head:
         standing.head = -1
         standing.n_members = 0
         return
@@ -123,12 +123,12 @@ def _take_choice(head, chosen, state, out, b, c):
     kept = 0
     for k in range(count):
         if others[k] != head:
-            if messages.in_one_hop(others[k], head, network.positions[b], c):
+            if messages.in_one_hop(others[k], head, network.positions[b], r):
                 others[kept] = others[k]
                 kept += 1
             else:
                 out.dropped += 1
-    out.handover = messages.form(head, others, kept, state, out, b, c)
+    out.handover = messages.form(head, others, kept, state, out, b, r)
     out.members = 1 + standing.n_members
 
 
@@ -155,13 +155,13 @@ def _list_living(chosen, battery, found):
 
 
 @lean_piece
-def wake(node, purpose, state, out, b, c):
+def wake(node, purpose, state, out, b, r):
     """A node pays for being awake in this period. Returns whether it could."""
-    return state.network.battery[b, node] > 0.0 and messages.spend(node, c.radio.awake_j, purpose, state, out, b)
+    return state.network.battery[b, node] > 0.0 and messages.spend(node, r.awake_j, purpose, state, out, b)
 
 
 @lean_piece
-def _sleep(state, out, b, c):
+def _sleep(state, out, b, r):
     """All living nodes outside the cluster pay for the period, too."""
     network, standing = state.network, state.network.row[b]
     battery, members, j = network.battery[b], network.members[b], 0
@@ -170,7 +170,7 @@ def _sleep(state, out, b, c):
             j += 1
         awake = node == standing.head or (j < standing.n_members and members[j] == node)
         if not awake and battery[node] > 0.0:
-            messages.spend(node, c.radio.asleep_j, messages.SENSING, state, out, b)
+            messages.spend(node, r.asleep_j, messages.SENSING, state, out, b)
 
 
 @lean_piece
@@ -187,7 +187,7 @@ def sense(node, head, purpose, target, state, out, b, c):
     if not has_news:
         return
     out.detections += 1
-    if messages.report(node, head, packets, purpose, state, out, b, c):
+    if messages.report(node, head, packets, purpose, state, out, b, c.radio):
         slot = reports.count[b]
         reports.node[b, slot] = node
         reports.value[b, slot, 0] = value
@@ -218,27 +218,27 @@ def _remember_miss(state, b, c):
 
 
 @lean_piece
-def _conclude(resampled, state, out, b, c):
+def _conclude(resampled, state, out, b, r, t):
     """After the correction: the broadcast, and the end of the period unless a search must come first; returns
     whether it must."""
     if resampled and state.network.row[b].head >= 0:
         out.resampled = True
-        if c.radio.to_head:
-            messages.broadcast(state, out, b, c)
-    lost = _is_lost(state, b, c)
+        if r.to_head:
+            messages.broadcast(state, out, b, r)
+    lost = _is_lost(state, b, t)
     if not lost:
-        _settle(state, out, b, c)
+        _settle(state, out, b, r, t)
     return lost
 
 
 @lean_piece
-def _is_lost(state, b, c):
+def _is_lost(state, b, t):
     """The search rule: too long a silence, or a belief wider than a node's radius; not twice within the gap."""
     cov, row = state.belief.row[b].cov, state.row[b]
-    wide = max(cov[0, 0], cov[2, 2]) > c.radius_m * c.radius_m
-    rested = row.period - row.last_search >= c.tracking.search_gap
+    wide = max(cov[0, 0], cov[2, 2]) > t.radius_m * t.radius_m
+    rested = row.period - row.last_search >= t.search_gap
     someone = state.network.row[b].alive > 0
-    return c.tracking.search != 0 and rested and someone and (wide or row.log_miss < c.tracking.log_search_miss)
+    return t.search != 0 and rested and someone and (wide or row.log_miss < t.log_search_miss)
 
 
 @lean_kernel
@@ -247,15 +247,15 @@ def settle(start, stop, cs, rows, outcomes, handle):
     state = state_at(handle)
     for b in range(start, stop):
         if rows[b]:
-            _settle(state, outcomes[b], b, cs[0])
+            _settle(state, outcomes[b], b, cs[0].radio, cs[0].tracking)
 
 
 @lean_piece
-def _settle(state, out, b, c):
+def _settle(state, out, b, r, t):
     """The dead, the costs, and the prediction for the next period (eq. 16)."""
     belief, target = state.belief.row[b], target_of(state, b)
     mean, cov = belief.mean, belief.cov
-    _remove_dead_nodes(state.network, b, c)
+    _remove_dead_nodes(state.network, b, r)
     total = 0.0
     for joules in out.energy_j:
         total += joules
@@ -270,19 +270,19 @@ def _settle(state, out, b, c):
     out.alive = state.network.row[b].alive
     luck = draws.bits(draws.stream(state.key[b], state.row[b].period, draws.POLICY), 0)
     state.row[b].luck = np.uint32(luck >> np.uint64(32))
-    if c.tracking.walks:
-        predict_walk(mean, cov, c, belief.predicted_mean, belief.predicted_cov)
+    if t.walks:
+        predict_walk(mean, cov, t, belief.predicted_mean, belief.predicted_cov)
     else:
-        predict_moments(mean, cov, c.period_s, c.tracking.q, belief.predicted_mean, belief.predicted_cov)
+        predict_moments(mean, cov, t.period_s, t.q, belief.predicted_mean, belief.predicted_cov)
 
 
 @lean_piece
-def _remove_dead_nodes(network, b, c):
+def _remove_dead_nodes(network, b, r):
     """Take the dead out of the cluster. It ends with its head, unless the head is a node like the others."""
     standing, battery, members = network.row[b], network.battery[b], network.members[b]
     if standing.head >= 0 and battery[standing.head] <= 0.0:
         standing.head = -1
-        if c.radio.to_head:
+        if r.to_head:
             standing.n_members = 0
     living = 0
     for k in range(standing.n_members):

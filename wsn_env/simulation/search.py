@@ -29,7 +29,7 @@ def search(start, stop, cs, rows, found, outcomes, handle):
         strongest = _wake_all(state, out, b, c)
         if strongest >= 0:
             # The new head takes over (the velocity is handed to it) and hears the others.
-            if messages.take_over(strongest, state, out, b, c):
+            if messages.take_over(strongest, state, out, b, c.radio):
                 out.handover = True
             out.detections = 0
             state.reports.count[b] = 0
@@ -62,7 +62,7 @@ def _wake_all(state, out, b, c):
         awake = node == standing.head or (j < standing.n_members and members[j] == node)
         if battery[node] <= 0.0 or not messages.spend(node, call, messages.SEARCH, state, out, b):
             continue
-        if not awake and not wake(node, messages.SEARCH, state, out, b, c):
+        if not awake and not wake(node, messages.SEARCH, state, out, b, c.radio):
             continue
         out.members += 1
         place = node_at(positions, node)

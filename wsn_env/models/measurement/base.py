@@ -93,7 +93,7 @@ class Measurement(Kind):
     def check_functions(self) -> None:
         """Raise ScenarioError unless the kind has what is required, and a likelihood."""
         super().check_functions()
-        if type(self).weigh is Measurement.weigh and not hasattr(type(self), "log_likelihood"):
+        if type(self).weigh is Measurement.weigh and not callable(getattr(type(self), "log_likelihood", None)):
             raise ScenarioError(
                 f"{type(self).__name__} has no log_likelihood(...): a measurement must have it, or weigh"
             )
@@ -135,16 +135,16 @@ class Measurement(Kind):
         return signal * 10 ** (by_db / 10)
 
     @staticmethod
-    def weigh(m, px, py, log_weights, first, step, node, value):
-        """Add a report's log likelihood to every step-th particle from the first on.
+    def weigh(m, px, py, log_weights, node, value):
+        """Add a report's log likelihood to the log weights of some particles.
 
         Args:
-            px, py: (P,) float32 m.
+            px, py, log_weights: (P,) float32; m, m, log weights to change.
             value: (2,) what was reported.
         """
-        first_value, second = F(value[0]), F(value[1])
-        for i in range(first, len(px), step):
-            log_weights[i] += F(log_likelihood(m, first_value, second, node, px[i], py[i]))
+        first, second = F(value[0]), F(value[1])
+        for i in range(len(px)):
+            log_weights[i] += F(log_likelihood(m, first, second, node, px[i], py[i]))
 
     @staticmethod
     def unwrap(m, value, about):
@@ -250,10 +250,10 @@ class Measurement(Kind):
         count, positions = reports.count[b], network.positions[b]
         for j in range(count):
             node, value = node_at(positions, reports.node[b, j]), reports.value[b, j]
-            if c.tracking.pooled:
-                weigh(m, x[0], x[2], log_weights, j, count, node, value)
-            else:  # a constant stride of 1 lets the compiler use vectors
-                weigh(m, x[0], x[2], log_weights, 0, 1, node, value)
+            if c.tracking.pooled:  # every count-th particle from the j-th on
+                weigh(m, x[0, j::count], x[2, j::count], log_weights[j::count], node, value)
+            else:
+                weigh(m, x[0], x[2], log_weights, node, value)
 
     @staticmethod
     def foretell(m, belief, positions, b, c, maps, scratch):

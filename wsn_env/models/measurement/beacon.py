@@ -213,7 +213,7 @@ class Beacon(Measurement):
         return (Line(own.expected, own.slope_x, own.slope_y, max(own.variance, 1e-12)),)
 
     @staticmethod
-    def weigh(m, px, py, log_weights, first, step, node, value):
+    def weigh(m, px, py, log_weights, node, value):
         """Levels are weighed together with their biases, in `weigh_period`."""
 
     @staticmethod

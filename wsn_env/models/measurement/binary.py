@@ -135,7 +135,7 @@ class Binary(Measurement):
         return (Line(distance, h0, h1, along * (1.0 - known) / max(known, 1e-12)),)
 
     @staticmethod
-    def weigh(m, px, py, log_weights, first, step, node, value):
+    def weigh(m, px, py, log_weights, node, value):
         """One reported state."""
         _weigh_state(px, py, log_weights, node, value[0] != 0.0, m.flip, m)
 

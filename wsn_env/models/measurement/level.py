@@ -102,11 +102,11 @@ class Level(Measurement):
         return level(m, dx * dx + dy * dy) + m.noise * noise
 
     @staticmethod
-    def weigh(m, px, py, log_weights, first, step, node, value):
+    def weigh(m, px, py, log_weights, node, value):
         half_precision = F(0.5 / max(m.noise * m.noise, 1e-20))
         sx, sy, z = F(node.x), F(node.y), F(value[0])
         at_1m, slope, floor = F(m.at_1m), F(m.slope), F(max(m.floor_m * m.floor_m, 1e-12))
-        for i in range(first, len(px), step):
+        for i in range(len(px)):
             dx = px[i] - sx
             dy = py[i] - sy
             r = (z - at_1m) + slope * log32(max(dx * dx + dy * dy, floor))

@@ -38,10 +38,10 @@ class Position(Measurement):
         return x + m.noise_m * e0, y + m.noise_m * e1
 
     @staticmethod
-    def weigh(m, px, py, log_weights, first, step, node, value):
+    def weigh(m, px, py, log_weights, node, value):
         half_precision = F(0.5 / max(m.noise_m * m.noise_m, 1e-20))
         zx, zy = F(value[0]), F(value[1])
-        for i in range(first, len(px), step):
+        for i in range(len(px)):
             dx = px[i] - zx
             dy = py[i] - zy
             log_weights[i] -= half_precision * (dx * dx + dy * dy)

@@ -75,13 +75,13 @@ class RssiPower(Measurement):
         return (Line(power(m, squared), slope * dx, slope * dy, m.noise * m.noise),)
 
     @staticmethod
-    def weigh(m, px, py, log_weights, first, step, node, value):
+    def weigh(m, px, py, log_weights, node, value):
         sx, sy = F(node.x), F(node.y)
         slope, floor = F(m.slope), F(max(m.floor_m * m.floor_m, 1e-12))
         log_floor = log32(floor)
         top = F(m.amplitude * exp(-m.slope * np.float64(log_floor)) / m.noise)  # at the floor, the greatest there is
         z = F(value[0] / m.noise)  # powers in units of the noise: their own may be too small for float32
-        for i in range(first, len(px), step):
+        for i in range(len(px)):
             dx = px[i] - sx
             dy = py[i] - sy
             r = z - top * exp32(-slope * (log32(max(dx * dx + dy * dy, floor)) - log_floor))

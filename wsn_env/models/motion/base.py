@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from wsn_env.compiled.elementary import HALF_PI, sincos
-from wsn_env.compiled.kernels import piece
+from wsn_env.compiled.kernels import lean_piece, piece
 from wsn_env.models.kinds import Kind, by_kind
 from wsn_env.models.quantity import ScenarioError
 
@@ -91,3 +91,9 @@ def heading_of(s, c):
         si, co = sincos(angle)
         angle += s * co - c * si
     return angle
+
+
+@lean_piece
+def set_state(state, x, vx, y, vy):
+    """Write a true state (4,)."""
+    state[0], state[1], state[2], state[3] = x, vx, y, vy

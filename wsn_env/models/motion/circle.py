@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
 from wsn_env.compiled.elementary import HALF_PI, sincos
-from wsn_env.models.motion.base import Motion
+from wsn_env.models.motion.base import Motion, set_state
 from wsn_env.models.quantity import quantity
 
 
@@ -16,6 +14,7 @@ from wsn_env.models.quantity import quantity
 class Circle(Motion):
     """Round the middle of the field at a constant speed (1.9 m/s by default)."""
 
+    allocates: ClassVar[bool] = False
     fitting_q: ClassVar[float] = 0.2
     circle_m: float = quantity(30.0, "radius", above=0)
     turn_s: float = quantity(100.0, "time of one round", above=0)
@@ -33,4 +32,4 @@ class Circle(Motion):
         for k in range(len(track)):
             s, c = sincos(w * k * course.period_s)
             x, y = course.side_m / 2 + m.circle_m * c, course.side_m / 2 + m.circle_m * s
-            track[k] = np.array((x, -m.circle_m * w * s, y, m.circle_m * w * c))
+            set_state(track[k], x, -m.circle_m * w * s, y, m.circle_m * w * c)

@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
 from wsn_env.compiled import draws
-from wsn_env.models.motion.base import Motion
+from wsn_env.models.motion.base import Motion, set_state
 from wsn_env.models.motion.prediction import advance
 from wsn_env.models.quantity import quantity
 
@@ -23,6 +21,7 @@ class Crossing(Motion):
     instant, which no filter with this q can follow.
     """
 
+    allocates: ClassVar[bool] = False
     fitting_q: ClassVar[float] = 0.05
     margin_m: float = quantity(10.0, "end points keep this distance from the border", at_least=0)
     crossing_m: float = quantity(40.0, "least distance between the end points", above=0)
@@ -57,7 +56,7 @@ class Crossing(Motion):
                 break
             draw += 4
         duration = steps * course.period_s
-        track[0] = np.array((x0, (x1 - x0) / duration, y0, (y1 - y0) / duration))
+        set_state(track[0], x0, (x1 - x0) / duration, y0, (y1 - y0) / duration)
         for attempt in range(TRIES + 1):  # the first noise that keeps the target in the field; at last none
             sd = m.acceleration_ms2 if attempt < TRIES else 0.0
             inside = True

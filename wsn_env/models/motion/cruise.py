@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
 from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import HALF_PI, sincos
-from wsn_env.models.motion.base import Motion
+from wsn_env.models.motion.base import Motion, set_state
 from wsn_env.models.motion.prediction import advance
 from wsn_env.models.quantity import quantity
 
@@ -25,6 +23,7 @@ class Cruise(Motion):
     variance D T^3 / 12 then, which is negligible beside any measurement here.
     """
 
+    allocates: ClassVar[bool] = False
     fitting_q: ClassVar[float] = 0.01
     speed_ms: float = quantity(1.0, "speed at the start", above=0)
     acceleration_ms2: float = quantity(0.01, "sd of the white acceleration on the track", at_least=0)
@@ -55,7 +54,7 @@ class Cruise(Motion):
             s, c = sincos(4.0 * HALF_PI * draws.uniform(stream, first + 2))
             x = m.inset_m + inner * draws.uniform(stream, first)
             y = m.inset_m + inner * draws.uniform(stream, first + 1)
-            track[0] = np.array((x, m.speed_ms * c, y, m.speed_ms * s))
+            set_state(track[0], x, m.speed_ms * c, y, m.speed_ms * s)
             inside = True
             for k in range(steps):
                 ax, ay = draws.normal_pair(stream, first // 2 + 2 + k)

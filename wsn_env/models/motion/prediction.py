@@ -47,11 +47,11 @@ def predict_covariance(cov, t, q, predicted_cov):
 
 
 @lean_piece
-def predict_walk(mean, cov, c, predicted_mean, predicted_cov):
+def predict_walk(mean, cov, t, predicted_mean, predicted_cov):
     """F x and F P F' + Q of a walker: v' = a v + sd sqrt(1 - a^2) e, x' = x + T (v + v') / 2; without walls."""
-    a, half = c.tracking.velocity_kept, 0.5 * c.period_s
+    a, half = t.velocity_kept, 0.5 * t.period_s
     way = half * (1.0 + a)
-    variance = (1.0 - a * a) * c.tracking.velocity_sd * c.tracking.velocity_sd
+    variance = (1.0 - a * a) * t.velocity_sd * t.velocity_sd
     noise = (half * half * variance + ROUGHENING_M * ROUGHENING_M, half * variance, variance)
     for axis in (0, 2):
         predicted_mean[axis] = mean[axis] + way * mean[axis + 1]

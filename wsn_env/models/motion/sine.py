@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
 from wsn_env.compiled.elementary import HALF_PI, sincos
-from wsn_env.models.motion.base import Motion
+from wsn_env.models.motion.base import Motion, set_state
 from wsn_env.models.quantity import quantity
 
 
@@ -16,6 +14,7 @@ from wsn_env.models.quantity import quantity
 class Sine(Motion):
     """One full wave across the field: x advances at a constant speed, y swings about the middle."""
 
+    allocates: ClassVar[bool] = False
     fitting_q: ClassVar[float] = 0.2
     speed_ms: float = quantity(0.9, "speed along x", above=0)
     amplitude_m: float = quantity(25.0, "swing along y", at_least=0)
@@ -35,4 +34,4 @@ class Sine(Motion):
             t = k * course.period_s
             s, c = sincos(w * t)
             x, y = 0.05 * course.side_m + m.speed_ms * t, course.side_m / 2 + m.amplitude_m * s
-            track[k] = np.array((x, m.speed_ms, y, m.amplitude_m * w * c))
+            set_state(track[k], x, m.speed_ms, y, m.amplitude_m * w * c)

@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
-from wsn_env.models.motion.base import Motion
+from wsn_env.models.motion.base import Motion, set_state
 from wsn_env.models.quantity import quantity
 
 
@@ -15,6 +13,7 @@ from wsn_env.models.quantity import quantity
 class Straight(Motion):
     """The diagonal of the reproduction: from a point at a constant velocity, without noise."""
 
+    allocates: ClassVar[bool] = False
     fitting_q: ClassVar[float] = 0.02
     from_m: float = quantity(5.0, "start, both axes", at_least=0)
     velocity_ms: float = quantity(0.9, "velocity, both axes")
@@ -23,4 +22,4 @@ class Straight(Motion):
     def draw(m, stream, course, track):
         for k in range(len(track)):
             x = m.from_m + m.velocity_ms * course.period_s * k
-            track[k] = np.array((x, m.velocity_ms, x, m.velocity_ms))
+            set_state(track[k], x, m.velocity_ms, x, m.velocity_ms)

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from wsn_env.compiled import draws
-from wsn_env.models.motion.base import Motion
+from wsn_env.models.motion.base import Motion, set_state
 from wsn_env.models.quantity import ScenarioError, quantity
 
 
@@ -16,6 +16,7 @@ from wsn_env.models.quantity import ScenarioError, quantity
 class Walk(Motion):
     """A walk in a room: straight to a uniform point of it, then to the next, each leg at a speed of its own."""
 
+    allocates: ClassVar[bool] = False
     fitting_q: ClassVar[float] = 0.2
     slowest_ms: float = quantity(0.14, "least speed of a leg", above=0)
     fastest_ms: float = quantity(0.73, "greatest speed of a leg", above=0)
@@ -56,4 +57,4 @@ class Walk(Motion):
                 draw += 3
             distance = np.sqrt((goal_x - x) ** 2 + (goal_y - y) ** 2)
             scale = speed / distance if distance > 0.0 else 0.0
-            track[k] = np.array((x, scale * (goal_x - x), y, scale * (goal_y - y)))
+            set_state(track[k], x, scale * (goal_x - x), y, scale * (goal_y - y))

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from wsn_env.compiled import draws
-from wsn_env.models.motion.base import Motion
+from wsn_env.models.motion.base import Motion, set_state
 from wsn_env.models.quantity import quantity
 
 
@@ -16,6 +16,7 @@ from wsn_env.models.quantity import quantity
 class Waypoint(Motion):
     """Random waypoint: straight at a constant speed to a uniform point of the field, then to the next."""
 
+    allocates: ClassVar[bool] = False
     fitting_q: ClassVar[float] = 0.2
     speed_ms: float = quantity(1.0, "speed", above=0)
 
@@ -48,4 +49,4 @@ class Waypoint(Motion):
                     draw += 2
             distance = np.sqrt((goal_x - x) ** 2 + (goal_y - y) ** 2)
             scale = m.speed_ms / distance if distance > 0.0 else 0.0
-            track[k] = np.array((x, scale * (goal_x - x), y, scale * (goal_y - y)))
+            set_state(track[k], x, scale * (goal_x - x), y, scale * (goal_y - y))

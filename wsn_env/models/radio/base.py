@@ -79,8 +79,11 @@ class Link(Kind):
         """Raise ScenarioError where it does not fit the rest of the scenario."""
 
     def constants(self, scenario) -> dict[str, float]:
-        """Sizes, prices and probabilities; who receives."""
+        """Sizes, prices and probabilities; who receives, and where a sink stands."""
+        width_m, depth_m = scenario.field.room_m
         return dict(
+            sink_x=0.5 * width_m,
+            sink_y=0.5 * depth_m,
             tx_j_per_bit=self.tx_j_per_bit,
             amplifier_j_per_bit_m2=self.amplifier_j_per_bit_m2,
             rx_j_per_bit=self.rx_j_per_bit,

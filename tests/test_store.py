@@ -1,0 +1,173 @@
+"""Kernels are kept by what they compute: docstrings and comments compile nothing, constants whoever uses them."""
+
+import os
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+MODULES = {
+    "numbers_of.py": '"""Constants."""\n\nFACTOR = 3.0\nOTHER = 5.0\nTABLE = (1.0, 2.0)\n',
+    "pieces.py": """
+        import numbers_of
+        from numbers_of import FACTOR
+        from wsn_env.compiled.kernels import lean_piece
+
+        @lean_piece
+        def scaled(x):
+            '''What it does.'''
+            return FACTOR * x
+
+        @lean_piece
+        def shifted(x):
+            return numbers_of.OTHER + x
+        """,
+    "work.py": """
+        import sys
+        from wsn_env.compiled.kernels import kernel
+        from pieces import scaled, shifted
+
+        @kernel
+        def first(x):
+            '''Scales.'''
+            return scaled(x)
+
+        @kernel
+        def second(x):
+            return shifted(x)
+
+        if __name__ == "__main__":
+            from wsn_env.compiled import store
+            print(first(2.0), second(2.0), *(name.rpartition(".")[2] for name in store.compiled))
+        """,
+}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for name, text in MODULES.items():
+        (tmp_path / name).write_text(textwrap.dedent(text))
+    return tmp_path
+
+
+def edit(path, old, new):
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+def run(folder, *arguments, **environment):
+    """(stdout's words, stderr) of the module `work`, with kernels kept in a folder beside it."""
+    kept = {"NUMBA_CACHE_DIR": str(folder / "kept"), "PYTHONDONTWRITEBYTECODE": "1"}
+    command = [sys.executable, *(arguments or ("work.py",))]
+    done = subprocess.run(command, cwd=folder, env=os.environ | kept | environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.split(), done.stderr
+
+
+def test_what_is_compiled_is_what_has_changed(folder):
+    assert run(folder)[0] == ["6.0", "7.0", "first", "second"]
+    assert run(folder)[0] == ["6.0", "7.0"]
+    edit(folder / "work.py", "Scales.", "Scales,\n    in other words.")
+    edit(folder / "pieces.py", "What it does.", "Another docstring,
+    of two lines.")
+    edit(folder / "pieces.py", "return FACTOR * x", "return FACTOR * x  # a comment")
+    edit(folder / "numbers_of.py", '"""Constants."""', '"""Numbers."""\n\nUNUSED = 7')
+    assert run(folder)[0] == ["6.0", "7.0"]
+    edit(folder / "numbers_of.py", "FACTOR = 3.0", "FACTOR = 4.0")  # in another file than the kernel's
+    assert run(folder)[0] == ["8.0", "7.0", "first"]
+    edit(folder / "numbers_of.py", "OTHER = 5.0", "OTHER = 6.0")  # reached through its module
+    assert run(folder)[0] == ["8.0", "8.0", "second"]
+    edit(folder / "numbers_of.py", "FACTOR = 4.0", "FACTOR = 3.0")  # an earlier version is still there
+    assert run(folder)[0] == ["6.0", "8.0"]
+    edit(folder / "pieces.py", "return FACTOR * x", "return 1.0 + FACTOR * x")
+    assert run(folder)[0] == ["7.0", "8.0", "first"]
+
+
+@pytest.mark.parametrize("ending", ["nbc", "nbi"])
+@pytest.mark.parametrize("damage", ["cut", "changed", "empty"])
+def test_a_damaged_file_is_compiled_anew_and_said(folder, ending, damage):
+    run(folder)
+    (path,) = [path for path in (folder / "kept").rglob(f"*.{ending}") if "first" in path.name]
+    whole = path.read_bytes()
+    middle = len(whole) // 2
+    flipped = whole[:middle] + bytes(255 - byte for byte in whole[middle : middle + 64]) + whole[middle + 64 :]
+    path.write_bytes({"cut": whole[:middle], "changed": flipped, "empty": b""}[damage])
+    words, said = run(folder)
+    assert words == ["6.0", "7.0", "first"]
+    assert "the kept kernel work.first" in said.replace("__main__", "work") and "is damaged" in said
+    assert run(folder) == (["6.0", "7.0"], "")
+
+
+def test_an_edit_of_a_kind_compiles_what_uses_the_kind(folder):
+    """The type of a kind's constants carries the stamp of its code."""
+    (folder / "kinds.py").write_text(
+        textwrap.dedent(
+            """
+            from dataclasses import dataclass
+            import numpy as np
+            from wsn_env import Scenario
+            from wsn_env.compiled import store
+            from wsn_env.filters.linear import LinearModel
+            from wsn_env.models import Line, Measurement
+
+            OFFSET = 2.0
+
+            @dataclass(frozen=True)
+            class Own(Measurement):
+                @staticmethod
+                def sample(m, stream, number, node, x, y):
+                    return x, 0.0
+
+                @staticmethod
+                def log_likelihood(m, value, second, node, x, y):
+                    return -((value - x) ** 2)
+
+                @staticmethod
+                def linearise(m, node, x, y, xx, xy, yy):
+                    '''About a point.'''
+                    return (Line(x + OFFSET, 1.0, 0.0, 1.0),)
+
+            for measurement in (Own(), "position"):
+                model = LinearModel(Scenario.named("PreDC-v0", measurement=measurement))
+                print(model.expected([(1.0, 2.0)], np.zeros((1, 2)))[0, 0], end=" ")
+            print(len(store.compiled))
+            """
+        )
+    )
+    assert run(folder, "kinds.py")[0] == ["3.0", "1.0", "1"]  # one kernel, for two types
+    assert run(folder, "kinds.py")[0] == ["3.0", "1.0", "0"]
+    edit(folder / "kinds.py", "About a point.", "About another.")
+    assert run(folder, "kinds.py")[0] == ["3.0", "1.0", "0"]
+    edit(folder / "kinds.py", "OFFSET = 2.0", "OFFSET = 3.0")
+    assert run(folder, "kinds.py")[0] == ["4.0", "1.0", "1"]
+
+
+PLAY = """
+import gymnasium as gym, wsn_env
+for name in ("PreDC-v0", "Binary-v0", "Underwater-v0", "Ble-v0"):
+    env = gym.make(f"wsn_env/{name}", particles=30, periods=4, observation="menu", disable_env_checker=True)
+    env.reset(seed=0)
+    print(*(round(float(env.step(action)[1]), 6) for action in (10, 3, 5)))
+"""
+
+
+def test_without_compiling_the_same_comes_out(folder):
+    """NUMBA_DISABLE_JIT=1: people debug and measure coverage so. Sums may run in another order."""
+    compiled = subprocess.run([sys.executable, "-c", PLAY], capture_output=True, text=True, check=True)
+    words, said = run(folder, "-c", PLAY, NUMBA_DISABLE_JIT="1")
+    assert [float(word) for word in words] == pytest.approx(list(map(float, compiled.stdout.split())), rel=0.05)
+    assert "compiling" not in said and "Warning" not in said
+
+
+def test_it_imports_where_processes_do_not_fork(folder):
+    code = "import os, gymnasium, numba, scipy; del os.register_at_fork; import wsn_env.cli, wsn_env.envs.env; print('well')"
+    assert run(folder, "-c", code)[0] == ["well"]
+
+
+def test_a_store_that_cannot_be_written_is_done_without(folder):
+    (folder / "file").write_text("")
+    words, said = run(folder, NUMBA_CACHE_DIR=str(folder / "file"))
+    assert words == ["6.0", "7.0", "first", "second"]
+    assert said.count("compiled kernels cannot be kept in") == 1

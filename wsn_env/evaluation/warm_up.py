@@ -1,0 +1,84 @@
+"""Every kernel of the shipped scenarios and policies compiled beforehand, by playing a little of everything."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import suppress
+from typing import NamedTuple
+
+from wsn_env.compiled import store
+from wsn_env.evaluation.progress import Progress
+
+
+class Job(NamedTuple):
+    """Kernels of one scenario; of two with the same kinds one will do."""
+
+    scenario: str
+    trackers: tuple[str, ...]  # beside the scenario's own
+    fast: bool = False
+
+
+JOBS = (  # the longest first
+    Job("PreDC-v0", ("ekf", "ickf"), fast=True),
+    Job("Rssi-v0", ("ekf", "ickf", "nonlinear_ls")),
+    Job("Underwater-v0", ("ekf", "ickf")),
+    Job("Binary-v0", ("boundary",)),
+    Job("Ble-v0", ()),
+    Job("Anchors-v0", ()),
+)
+
+
+def compile_everything(progress: Progress | None = None) -> int:
+    """Compile and keep all kernels, in a process for each core.
+
+    Args:
+        progress: called as progress(done, total, what).
+
+    Returns: how many were compiled; the others were there.
+    """
+    count = 0
+    context = multiprocessing.get_context("spawn")
+    workers = min(len(JOBS), len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
+    with ProcessPoolExecutor(workers, mp_context=context) as pool:
+        waiting = [pool.submit(compile_job, job) for job in JOBS]
+        for done, each in enumerate(as_completed(waiting)):
+            count += each.result()
+            if progress is not None:
+                progress(done + 1, len(JOBS), "compiling")
+    return count
+
+
+def compile_job(job: Job) -> int:
+    """Play what a job names; returns how many kernels were compiled for it."""
+    from wsn_env.envs.env import ClusterEnv
+    from wsn_env.evaluation.policies import make_policy, policy_names
+    from wsn_env.evaluation.rollout import episodes, rollout
+    from wsn_env.scenario import Scenario
+    from wsn_env.simulation.view import View
+    from wsn_env.simulation.world import World
+
+    before = len(store.compiled)
+    small = {"particles": 20, "periods": 3}
+    for order, observation in (("nearest", "candidates"), ("information", "menu")):
+        for fast in (False, True) if job.fast else (False,):
+            pictures = {"render_mode": "rgb_array", "frame_px": 64}
+            env = ClusterEnv(job.scenario, order=order, observation=observation, fast=fast, **pictures, **small)
+            env.reset(seed=0)
+            env.step(10)
+            env.render()
+    scenario = Scenario.named(job.scenario, **small)
+    looking = scenario if scenario.measurement.lasting_errors else scenario.override(start="search")
+    for state, _ in episodes(make_policy("nearest2", looking), World(looking), [0]):
+        View.from_arrays(View.of(state).as_arrays())
+    rollout(make_policy("nearest2", scenario), World(scenario), [0])  # with its bound
+    for name in policy_names():
+        with suppress(ValueError):  # no network for this scenario, or a planner that cannot plan in it
+            make_policy(name, scenario).act(View.of(World(scenario).reset([0])))
+    for tracker in job.trackers:
+        kept = {"silent_information": False, "resampling": "systematic"}
+        other = scenario.override(tracker=tracker, **kept)
+        for _ in episodes(make_policy("nearest2", other), World(other), [0]):
+            pass
+    return len(store.compiled) - before
