@@ -44,7 +44,7 @@ def by_pillow(state, scenario, estimates, enlarged: int) -> np.ndarray:
         draw.line(pixels(nodes[[node, head]]), fill=ORANGE, width=2 * enlarged)
     discs(nodes[members], 5 * enlarged, BLUE)
     discs(nodes[[head]], 8 * enlarged, VERMILION)
-    draw.line(pixels(state.track[0, : state.period[0] + 1, ::2]), fill=GREEN, width=2 * enlarged)
+    draw.line(pixels(state.track[0, : state.row["period"][0] + 1, ::2]), fill=GREEN, width=2 * enlarged)
     draw.line(pixels(estimates), fill=INK, width=enlarged)
     return np.asarray(image if enlarged == 1 else image.reduce(enlarged))
 

@@ -17,7 +17,7 @@ import numpy as np
 from rich.console import Console
 
 from benchmarks.race import Claim, Options, Result, Table, figure, main
-from wsn_env.filters.kernels import scratch
+from wsn_env.filters.kernels import make_scratch
 from wsn_env.models.state import Cluster, State
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.world import World
@@ -47,7 +47,7 @@ def measure(options: Options, console: Console) -> Result:
         console.print(f"memory, {particles} particles, {nodes} nodes", style="dim")
         size = f"P = {particles:,}, S = {nodes:,}"
         basis = 24 * particles + 64 * nodes
-        counted = bytes_by_part(State.zeros(1, nodes, Scenario.named(ID).periods, particles))
+        counted = bytes_by_part(_world(particles, nodes).allocate(1))
         total = sum(counted.values())
         grown, why = growth(particles, nodes, rows)
         resident = None if grown is None else (grown - scratch_bytes(particles)) / rows
@@ -72,17 +72,16 @@ def measure(options: Options, console: Console) -> Result:
 
 def bytes_by_part(state: State) -> dict[str, int]:
     """Bytes a row of a state's arrays, by its parts."""
-    parts = {name: _bytes(getattr(state, name)) // state.rows for name in State._fields}
-    return {"belief": parts.pop("belief"), "track": parts.pop("track")} | parts
-
-
-def _bytes(value) -> int:
-    return sum(map(_bytes, value)) if isinstance(value, tuple) else value.nbytes
+    parts = dict.fromkeys(("belief", "track"), 0)
+    for name, array in state.leaves():
+        part = name.partition(".")[0]
+        parts[part] = parts.get(part, 0) + array.nbytes // state.rows
+    return parts
 
 
 def scratch_bytes(particles: int) -> int:
     """Of a thread's filter."""
-    return sum(array.nbytes for array in scratch.py_func(particles))
+    return sum(array.nbytes for array in make_scratch.py_func(particles))
 
 
 def growth(particles: int, nodes: int, rows: int) -> tuple[int | None, str]:
@@ -97,12 +96,16 @@ def growth(particles: int, nodes: int, rows: int) -> tuple[int | None, str]:
 
 def grow(particles: int, nodes: int, rows: int) -> None:
     """In the child: print the growth. Two rows run before, so that the code is loaded."""
-    world = World(Scenario.named(ID, particles=particles, nodes=nodes), threads=1)
+    world = _world(particles, nodes)
     kept = [_run(world, 2)]  # not freed: what comes could settle in its place, unseen
     before = resident_bytes("VmRSS")
     CLEAR.write_text("5")  # the peak begins anew
     kept.append(_run(world, rows))
     print(resident_bytes("VmHWM") - before)
+
+
+def _world(particles: int, nodes: int) -> World:
+    return World(Scenario.named(ID, particles=particles, nodes=nodes), threads=1)
 
 
 def _run(world: World, rows: int) -> State:

@@ -17,9 +17,9 @@ from rich.console import Console
 from benchmarks.race import Claim, Options, Plot, Result, Table, Times, figure, interleave, main
 from benchmarks.stopwatch import Stopwatch
 from benchmarks.vector import ID, MENU_ENTRY
-from wsn_env.compiled.kernels import lean_piece
+from wsn_env.compiled.kernels import lean_kernel
 from wsn_env.envs.interface import Settings
-from wsn_env.models.state import Network
+from wsn_env.models.state import Network, network_at
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.geometry import nearest, nearest_candidates
 from wsn_env.simulation.world import World
@@ -107,11 +107,12 @@ def searches(growth: str, nodes: int) -> tuple[Callable[[], None], Callable[[], 
         for point in points:
             nearest(network, point, Settings.candidates)
 
-    return call, lambda: _search(network, points[:, 0], *found)
+    return call, lambda: _search(network.handle, points[:, 0], *found)
 
 
-@lean_piece
-def _search(network, points, nodes, distances):
+@lean_kernel
+def _search(network_handle, points, nodes, distances):
+    network = network_at(network_handle)
     for i in range(len(points)):
         nearest_candidates(network, 0, points[i, 0], points[i, 1], nodes, distances)
 

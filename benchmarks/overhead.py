@@ -119,7 +119,7 @@ class Recorder:
     def start(self, keys, periods, rows, belief: Belief) -> None:
         """A new record."""
         self.tracker.start(keys, periods, rows, belief)
-        self.record = Record(keys.copy(), _copy(belief))
+        self.record = Record(keys.copy(), belief.copy())
 
     def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
         """A new period."""
@@ -151,7 +151,7 @@ class Episode:
         recorded.world.tracker = recorder
         self._check_same_episode(recorded)
         self.record = recorder.record
-        self.belief = _copy(self.record.start)
+        self.belief = self.record.start.copy()
         self.world = self.envs.world
         self.state = self.world.reset(self.record.keys)
         self._check_same_beliefs()
@@ -231,12 +231,8 @@ class Episode:
             raise SystemExit("the replayed filter computes something else: nothing to compare")
 
 
-def _copy(belief: Belief) -> Belief:
-    return Belief(*(array.copy() for array in belief))
-
-
 def _assign(belief: Belief, other: Belief) -> None:
-    for to, array in zip(belief, other):
+    for (_, to), (_, array) in zip(belief.leaves(), other.leaves()):
         to[:] = array
 
 

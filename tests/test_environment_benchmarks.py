@@ -1,5 +1,7 @@
 """What is compared is the same, and every measurement runs. (Nothing here looks at a clock.)"""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 from rich.console import Console
@@ -72,10 +74,12 @@ def test_the_same_density():
 
 
 def test_bytes_are_those_of_every_array():
-    state = State.zeros(2, 50, 10, 100)
+    lengths = dict(rows=2, nodes=50, instants=11)
+    state = State.zeros(**lengths, particles=100)
     parts = memory.bytes_by_part(state)
-    assert set(parts) == set(State._fields)
-    assert parts["belief"] - memory.bytes_by_part(State.zeros(2, 50, 10, 0))["belief"] == 20 * 100
+    assert set(parts) == {item.name for item in fields(State)}
+    assert sum(parts.values()) == sum(array.nbytes for _, array in state.leaves()) // 2
+    assert parts["belief"] - memory.bytes_by_part(State.zeros(**lengths))["belief"] == 20 * 100
     assert parts["track"] == 11 * 32
 
 

@@ -7,7 +7,7 @@ from tests.anchors import play_subsets, ring_scenario
 from wsn_env import World
 from wsn_env.filters import make_tracker
 from wsn_env.filters.fingerprint import _network, _training, trained_network, training_of
-from wsn_env.models.physics.motion import predict_moments
+from wsn_env.models.motion.prediction import predict_moments
 from wsn_env.scenario.tracking import BOUNDARY_TRACKERS, TRACKERS
 
 CASES = [(name, start) for name in TRACKERS for start in ("known", "fix")]

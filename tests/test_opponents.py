@@ -8,15 +8,16 @@ import pytest
 
 from studies import tuning
 from tests.test_policies import SCENARIO, chosen, walked
+from tests.worlds import sensors_of
 from wsn_env import Scenario, View, World
 from wsn_env.agents.adaptive import RULES, Adaptive, Switch
 from wsn_env.agents.greedy import Greedy, Terms
 from wsn_env.agents.nearest import ORDERS, Nearest
 from wsn_env.agents.tuned import TABLE, nearest_lam
 from wsn_env.envs.actions import MenuAction
-from wsn_env.models.physics.constants import constants
-from wsn_env.models.physics.sensing import mean_detection
+from wsn_env.envs.merit import chance_of
 from wsn_env.models.quantity import ScenarioError
+from wsn_env.scenario.constants import constants
 
 RSSI = Scenario.named("Rssi-v0", particles=200)
 EVER = 1e9  # a hysteresis that no head leaves
@@ -33,7 +34,7 @@ def positions_view():
 
 
 def with_lam(view, lam):
-    other = replace(view, row=view.row.copy(), _nearest={})
+    other = View(replace(view.knowledge, row=view.row.copy()))
     other.row["lam"] = lam
     return other
 
@@ -70,7 +71,7 @@ def test_the_head_stays_within_the_hysteresis(view, order):
 
 def test_where_nodes_report_positions_and_the_belief_is_round_the_orders_are_the_same(positions_view):
     """Who is most likely to detect tells most, and that is the nearest."""
-    view = replace(positions_view, belief=positions_view.belief.copy(), _nearest={})
+    view = View(replace(positions_view.knowledge, belief=positions_view.belief.copy()))
     view.belief["predicted_cov"] = np.diag([2.0, 1.0, 2.0, 1.0])
     for hysteresis_m in (0.0, 5.0):
         a, b = (Nearest(SCENARIO, 4, hysteresis_m, order).act(view) for order in ORDERS)
@@ -130,9 +131,8 @@ def covariance_after(p, detection):
 
 def chances(scenario, view, row, nodes):
     """Of detecting the target, under the belief."""
-    p = view.predicted_cov[row][::2, ::2]
-    offsets = view.positions[row, nodes] - view.prediction[row]
-    return np.array([mean_detection(*offset, p[0, 0], p[0, 1], p[1, 1], constants(scenario)[0]) for offset in offsets])
+    sensors, mean, cov = sensors_of(view.positions[row]), view.predicted_mean[row], view.predicted_cov[row]
+    return np.array([chance_of(sensors, node, mean, cov, constants(scenario)[0]) for node in nodes])
 
 
 def price_mj(view, row, node, head, detection, service):

@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 
 from tests.test_policies import SCENARIO, chosen, walked
-from tests.worlds import sensors_of
+from tests.worlds import assert_same, sensors_of
 from wsn_env import Scenario, View, World, evaluate
 from wsn_env.agents.imagined import GaussianTracker, draw_worlds, imagined_world, place_nodes, rows_of
 from wsn_env.agents.nearest import ORDERS, Nearest
 from wsn_env.agents.planner import Planner, main
 from wsn_env.compiled import draws
 from wsn_env.envs.merit import gain
-from wsn_env.models.physics.constants import constants
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.models.state import KEEP_CLUSTER
 from wsn_env.scenario import PRESETS
+from wsn_env.scenario.constants import constants
 
 RSSI = Scenario.named("Rssi-v0", particles=200)
 QUICK = dict(horizon=3, worlds=12)
@@ -66,7 +66,7 @@ def test_a_view_is_left_as_it_was():
     state = some_rows()
     kept = state.copy()
     Planner(SCENARIO, **QUICK).act(View.of(state))
-    assert all(a.tobytes() == b.tobytes() for a, b in zip(state.arrays(), kept.arrays()))
+    assert_same(state, kept)
 
 
 def believing(sd_m, scenario):

@@ -18,8 +18,8 @@ from wsn_env.cli import main
 from wsn_env.compiled import draws
 from wsn_env.evaluation.kept_blocks import BLOCKS_FILE
 from wsn_env.evaluation.policies import named_policies, policy_names
-from wsn_env.models.physics.sensing import detection_probability
 from wsn_env.models.state import Cluster
+from wsn_env.scenario.sensing import detection_probability
 
 SCENARIO = Scenario.named("PreDC-v0", particles=200)
 
@@ -61,7 +61,7 @@ def test_pre_dc_forms_until_the_joint_probability_passes_theta(view):
     for row in range(40):
         order = np.argsort(view.distance[row])
         assert cluster.head[row] == order[0]
-        p = detection_probability(view.distance[row][order], SCENARIO.detection)
+        p = detection_probability(view.distance[row][order], SCENARIO)
         joint = 1 - np.cumprod(1 - p)
         size = int(np.argmax(joint > 0.9)) + 1 if (joint > 0.9).any() else int((p > 0).sum())
         assert chosen(cluster, row) == set(order[:size].tolist()), row
@@ -71,7 +71,7 @@ def test_pre_dc_keeps_while_sharp_and_covering_and_else_not(view):
     kept = PreDC(SCENARIO, phi0_m=1e9, theta=1e-12).act(view)
     assert all(chosen(kept, row) == set(np.flatnonzero(view.member[row])) for row in range(40))
     default = PreDC(SCENARIO).act(view)
-    p = detection_probability(view.distance, SCENARIO.detection)
+    p = detection_probability(view.distance, SCENARIO)
     joint = 1 - np.prod(np.where(view.member, 1 - p, 1), axis=1)
     keep = (view.spread_m < 2) & (joint >= 0.9)
     assert 2 < keep.sum() < 38
@@ -84,7 +84,7 @@ def test_pre_dc_takes_all_who_can_when_theta_is_out_of_reach():
     scenario = SCENARIO.override(nodes=25)  # two or three nodes in reach
     view = View.of(walked(3, scenario))
     cluster = PreDC(scenario, phi0_m=1e-9, theta=0.999).act(view)
-    p = detection_probability(view.distance, scenario.detection)
+    p = detection_probability(view.distance, scenario)
     for row in range(40):
         assert chosen(cluster, row) == set(np.flatnonzero(p[row] > 0)) | {int(cluster.head[row])}
 
@@ -93,8 +93,8 @@ def test_pre_dc_passes_over_a_head_without_energy(view):
     nearest = view.nearest_living()
     battery = view.battery.copy()
     battery[np.arange(40), nearest] = 1e-6  # alive, but a handover costs more
-    poor = View.of(walked())
-    poor = replace(poor, network=poor.network._replace(battery=battery), _nearest={})
+    knowledge = View.of(walked()).knowledge
+    poor = View(replace(knowledge, network=replace(knowledge.network, battery=battery)))
     head = PreDC(SCENARIO, phi0_m=1e-9).act(poor).head
     assert (head != nearest).all()
     assert (head == poor.nearest(2)[0][:, 1]).all()
@@ -129,7 +129,7 @@ def test_boundary_wakes_the_ring():
     view = View.of(walked(5, scenario, "boundary"))
     dead = view.battery.copy()
     dead[:, ::3] = 0.0
-    view = replace(view, network=view.network._replace(battery=dead), _nearest={})
+    view = View(replace(view.knowledge, network=replace(view.network, battery=dead)))
     cluster = Boundary(scenario, width_m=4.0, sds=2.0).act(view)
     for row in range(40):
         speed = np.hypot(*view.predicted_mean[row, 1::2])
@@ -164,7 +164,7 @@ def test_boundary_hears_as_much_as_all_at_less_cost():
 
 
 def test_static_cluster_and_all(view):
-    p = detection_probability(view.distance, SCENARIO.detection)
+    p = detection_probability(view.distance, SCENARIO)
     static, everybody = (make_policy(name, SCENARIO).act(view) for name in ("static_cluster", "all"))
     for row in range(40):
         assert chosen(static, row) == set(np.flatnonzero(p[row] > 0)) | {int(view.distance[row].argmin())}
@@ -186,7 +186,7 @@ def test_nearest_counts_further_members_and_keeps_its_head(view, n):
 
 def test_a_policy_that_says_so_does_not_look_at_lam(view):
     """An evaluation plays it once for all lams. What says nothing counts as looking."""
-    other = replace(view, row=view.row.copy(), _nearest={})
+    other = View(replace(view.knowledge, row=view.row.copy()))
     other.row["lam"] = np.geomspace(0.01, 1000, 40)
     seeing = set()
     for name in policy_names():

@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from wsn_env import Scenario, ScenarioError, World
-from wsn_env.models.sections import Detection, Field, Motion, Position, Radio, Rssi, Sine, Straight
+from wsn_env.models.detection.radius import Detection
+from wsn_env.models.field import Field
+from wsn_env.models.measurement.position import Position
+from wsn_env.models.measurement.rssi import Rssi
+from wsn_env.models.motion.base import Motion
+from wsn_env.models.motion.sine import Sine
+from wsn_env.models.motion.straight import Straight
+from wsn_env.models.radio.radio import Radio
 from wsn_env.scenario.tracking import Tracking
 
 
@@ -67,9 +74,9 @@ from wsn_env.scenario.tracking import Tracking
         (dict(search_miss=0), ["Tracking.search_miss = 0", "above 0"]),
         (dict(speed_ms=-1, motion="turns"), ["Turns.speed_ms = -1", "above 0"]),
         (dict(motion="sinus"), ["Scenario.motion = 'sinus'", "did you mean sine"]),
-        (dict(motion=3), ["Scenario.motion = 3", "must be a Crossing or"]),
-        (dict(motion=Motion()), ["Scenario.motion", "must be a Crossing or"]),
-        (dict(motion=Sine), ["Scenario.motion", "must be a Crossing or"]),
+        (dict(motion=3), ["Scenario.motion = 3", "must be a Circle or Crossing or"]),
+        (dict(motion=Motion()), ["Motion has no draw(...)", "a motion must have draw"]),
+        (dict(motion=Sine), ["Scenario.motion", "must be a Circle or Crossing or"]),
         (dict(measurement="rsi"), ["Scenario.measurement = 'rsi'", "did you mean rssi"]),
         (dict(field=Radio()), ["Scenario.field", "must be a Field"]),
         (dict(nods=5), ["'nods'", "did you mean nodes"]),
@@ -177,7 +184,7 @@ def test_table_1_is_the_default():
         128,
         32,
     )
-    assert (s.filter_q, s.measurement.noise_m, d.reach_m, s.handover_bits) == (0.05, 2, 12, 448)
+    assert (s.filter_q, s.measurement.noise_m, s.reach_m, s.handover_bits) == (0.05, 2, 12, 448)
     assert s.override(handover="particles").handover_bits == 800_000
 
 
@@ -227,11 +234,11 @@ def test_fields_are_uniform():
 
 def test_lam_is_drawn_log_uniformly():
     world = World(Scenario.named("PreDC-v0", lam=(0.3, 30), nodes=1, particles=2), threads=1)
-    z = np.log(world.reset(np.arange(4000)).lam / 0.3) / np.log(100)
+    z = np.log(world.reset(np.arange(4000)).row["lam"] / 0.3) / np.log(100)
     assert z.min() >= -1e-12 and z.max() <= 1 + 1e-12
     assert abs(z.mean() - 0.5) < 4 / (12 * 4000) ** 0.5
     assert abs(z.var() - 1 / 12) < 4 / (180 * 4000) ** 0.5
-    assert (World(Scenario(lam=0), threads=1).reset([5]).lam == 0).all()
+    assert (World(Scenario(lam=0), threads=1).reset([5]).row["lam"] == 0).all()
 
 
 def test_as_dict_goes_into_json():

@@ -6,8 +6,11 @@ import numpy as np
 from hypothesis import strategies as st
 
 from wsn_env import Cluster, Scenario, World
-from wsn_env.models.state import RECEIVER, Sensors
-from wsn_env.scenario.tracking import BOUNDARY_TRACKERS, MEASUREMENTS, READS
+from wsn_env.compiled.arrays import Arrays
+from wsn_env.models.library import MEASUREMENTS
+from wsn_env.models.measurement.beacon_levels import RECEIVER
+from wsn_env.models.state import Sensors
+from wsn_env.scenario.tracking import BOUNDARY_TRACKERS, reads
 
 TRACKERS = ("particle", "particle", "particle", "ekf", "ukf", "ickf", "snapshot", *BOUNDARY_TRACKERS)
 MOTIONS = ["crossing", "straight", "sine", "circle", "turns", "waypoint"]
@@ -22,8 +25,8 @@ def scenarios(draw, trackers=TRACKERS, modem_hops_m=(30.0, 70.0, 250.0), **fixed
 
     A third have modems, with batteries (given ones, too) MODEM_J times as large.
     """
-    readable = {name: [t for t in trackers if kind in READS[t]] for name, kind in MEASUREMENTS.items()}
-    measurement = fixed.get("measurement", draw(st.sampled_from([name for name in MEASUREMENTS if readable[name]])))
+    readable = {name: [t for t in trackers if reads(t, kind())] for name, kind in MEASUREMENTS.kinds.items()}
+    measurement = fixed.get("measurement", draw(st.sampled_from([name for name in readable if readable[name]])))
     tracker = fixed.get("tracker", draw(st.sampled_from(readable[measurement])))
     overrides = dict(
         nodes=draw(st.integers(1, 60)),
@@ -162,8 +165,11 @@ def play(scenario, keys, seed, threads=1, pick=None, donate=False):
 
 
 def leaves(value, path=""):
-    """(name, array) of all arrays in nested NamedTuples and dicts; the fields of structured ones apart."""
-    if isinstance(value, tuple):
+    """(name, array) of all arrays in records, nested NamedTuples and dicts; the fields of structured ones apart."""
+    if isinstance(value, Arrays):
+        for name, part in value.leaves():
+            yield from leaves(part, f"{path}.{name}")
+    elif isinstance(value, tuple):
         for name, part in zip(value._fields, value, strict=True):
             yield from leaves(part, f"{path}.{name}")
     elif isinstance(value, dict):

@@ -40,11 +40,11 @@ class Strict(Contestant):
     def advance(self, period: int) -> None:
         """Period, nodes and reports into the state, and the tracker's step."""
         state = self.state
-        state.period[:] = period + 1
+        state.row["period"] = period + 1
         state.network.positions[:] = self.sensors[period]
         state.reports.value[:] = self.values[period]
         self.world.tracker.correct(
-            state.key, state.period.copy(), state.belief, state.network, state.reports, self.resampled
+            state.key, state.row["period"].copy(), state.belief, state.network, state.reports, self.resampled
         )
         state.belief.predicted_mean[:] = state.belief.mean
 

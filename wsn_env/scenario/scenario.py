@@ -254,7 +254,7 @@ class Scenario(Section):
             name = next(iter(changes))
             raise ScenarioError(f"scenario has no quantity {name!r}: {suggest(name, known)}")
         motion = whole.get("motion", self.motion)
-        if motion != self.motion and "periods" not in whole:
+        if isinstance(motion, Motion) and motion != self.motion and "periods" not in whole:
             horizon = motion.horizon(whole.get("period_s", self.period_s))
             whole |= {} if horizon is None else {"periods": horizon}
         return replace(self, **whole)  # at once: a tracker and what it reads may change together
