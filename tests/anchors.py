@@ -3,7 +3,7 @@
 import numpy as np
 
 from wsn_env import Cluster, Scenario, World
-from wsn_env.models.sections import Rssi
+from wsn_env.models.measurement.rssi import Rssi
 
 RING = ((0, 0), (100, 0), (200, 0), (0, 100), (200, 100), (0, 200), (100, 200), (200, 200))
 
