@@ -10,10 +10,10 @@ from tests.test_sensing import assert_normal, measured
 from tests.worlds import sensors_of
 from wsn_env import Scenario
 from wsn_env.envs.merit import gain
-from wsn_env.models.physics.acoustics import absorption_db_per_km, ambient_noise_db
-from wsn_env.models.physics.constants import constants
-from wsn_env.models.physics.sensing import expected_strengths, linearised_strengths
-from wsn_env.models.sections import Sonar
+from wsn_env.filters.linear import LinearModel
+from wsn_env.models.acoustics import absorption_db_per_km, ambient_noise_db
+from wsn_env.models.measurement.sonar import Sonar
+from wsn_env.scenario.constants import constants
 
 ALPHA = 1.18703e-3  # dB/m at 10 kHz
 
@@ -80,14 +80,15 @@ def test_levels_weigh_like_plain_numpy(particles):
 
 
 def test_the_slope_of_the_level():
-    measurement = Scenario.named("PreDC-v0", measurement="sonar", frequency_khz=500.0).measurement
+    scenario = Scenario.named("PreDC-v0", measurement="sonar", frequency_khz=500.0)
     nodes, point, step = np.array([[40.0, 50.0]]), np.array([52.0, 61.0]), 1e-5
-    levels, slopes = linearised_strengths(point, nodes, measurement)
-    assert levels == expected_strengths(point, nodes, measurement)
+    model = LinearModel(scenario)
+    levels, slopes = model.expected([point], nodes)[0], model.slopes([point], nodes)[0]
+    assert levels[0] == pytest.approx(scenario.measurement.mean_db(math.hypot(12.0, 11.0)), rel=1e-12)
     for axis in (0, 1):
         shift = step * np.eye(2)[axis]
-        ends = (expected_strengths(point + way * shift, nodes, measurement) for way in (1, -1))
-        assert slopes[0, axis] == pytest.approx((next(ends) - next(ends))[0] / (2 * step), rel=1e-6)
+        ahead, behind = model.expected([point + shift, point - shift], nodes)[:, 0]
+        assert slopes[0, axis] == pytest.approx((ahead - behind) / (2 * step), rel=1e-6)
 
 
 def test_information_gain_knows_the_slope():

@@ -6,9 +6,10 @@ import pytest
 from tests.worlds import keys_of
 from wsn_env import Cluster, Scenario, View, World, make_policy
 from wsn_env.envs.env import ClusterEnv
+from wsn_env.models.measurement.beacon import Beacon
+from wsn_env.models.measurement.beacon_levels import SILENT_DB
 from wsn_env.models.quantity import ScenarioError
-from wsn_env.models.sections import Beacon
-from wsn_env.models.state import NOBODY, SILENT_DB
+from wsn_env.models.state import NOBODY
 
 QUIET = dict(field_db=0.0, drift_db=0.0, main_db=0.0, main_sd_db=0.0, fade_share=0.0, loss=0.0, loss_after_loss=0.0)
 STILL = dict(motion="legs", start_m=(9.0, 8.0), legs=((1.0, 1e-9, 1e-9),))
@@ -188,7 +189,7 @@ def measure(scenario, bias_db):
     world = World(scenario)
     if bias_db is not None:
         for record in (world._constants, world.tracker._constants):
-            record["bias_variance"] = bias_db**2
+            record["measurement"]["bias_variance"] = bias_db**2
     state, chooser, ratios = world.reset(keys_of(7, 100)), make_policy("all", scenario), []
     for period in range(60):
         state, outcome = world.step(state, chooser.act(View.of(state)))

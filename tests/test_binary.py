@@ -1,12 +1,14 @@
 """Binary sensors in the world: who reports, what the sink knows, what it costs; the particle filter on the bitmap."""
 
+import numba
 import numpy as np
 import pytest
 
 from wsn_env import Cluster, Scenario, View, World
-from wsn_env.filters.likelihood import weigh_state, weigh_states
-from wsn_env.models.physics.constants import constants
+from wsn_env.models.measurement.base import node_at, weigh, weigh_period
 from wsn_env.models.quantity import ScenarioError
+from wsn_env.models.state import state_at
+from wsn_env.scenario.constants import constants
 from wsn_env.scenario.tracking import BOUNDARY_TRACKERS
 
 REPORT, SEARCH = 3, 5
@@ -174,7 +176,25 @@ def test_one_bit_has_no_strength_so_that_the_head_after_a_search_tells_nothing_f
 # --- the particle filter on the bitmap ----------------------------------------------------------------------
 
 
-NOBODY = np.empty(0, np.int32)  # has reported
+NOBODY = ()  # has reported
+
+
+def weigh_states(x, log_weights, state, bitmap, nodes, cs):
+    """The weights (P,) by a bitmap (S,) of which some nodes have just reported."""
+    told = state.copy()
+    told.reports.bitmap[0], told.reports.count[0], told.reports.node[0, : len(nodes)] = bitmap, len(nodes), nodes
+    _weigh_period(x, log_weights, told.handle, cs, np.zeros((0, 0, 0), np.float32), np.empty_like(log_weights))
+
+
+@numba.njit
+def _weigh_period(x, log_weights, handle, cs, maps, scratch):
+    state, c = state_at(handle), cs[0]
+    weigh_period(c.measurement, x, log_weights, state.belief, state.network, state.reports, 0, c, maps, scratch)
+
+
+@numba.njit
+def weigh_state(x, log_weights, positions, node, value, cs):
+    weigh(cs[0].measurement, x[0], x[2], log_weights, 0, 1, node_at(positions, node), value)
 
 
 def cloud(width=30.0, n=500):
@@ -198,10 +218,9 @@ def test_a_state_weighs_like_plain_numpy(detects, overrides, wrong):
     for reported in (False, True):
         x, log_weights = cloud()
         scenario = scene(edge_m=2.0, **overrides).override(positions=((120.0, 90.0),))
-        state, c = World(scenario).reset([0]), constants(scenario)[0]
+        state = World(scenario).reset([0])
         state.network.row["head"] = 0
-        nodes = np.array([0] if reported else [], np.int32)
-        weigh_states(x, log_weights, state.network, np.array([detects], np.int8), nodes, 0, c)
+        weigh_states(x, log_weights, state, [detects], [0] if reported else NOBODY, constants(scenario))
         f = max(overrides.get("flip", 0.0), 1e-6) if reported else wrong
         distance = np.hypot(x[0].astype(float) - 120, x[2].astype(float) - 90)
         p = f + (1 - 2 * f) * scenario.detection.ceiling / (1 + np.exp((distance - 40) / 2))
@@ -212,13 +231,14 @@ def test_a_state_weighs_like_plain_numpy(detects, overrides, wrong):
 def test_nodes_that_are_left_out_would_have_told_all_particles_the_same(width):
     scenario = scene(particles=500)
     *_, (awake, state, _) = play(scenario, some)
-    c = constants(scenario)[0]
+    cs = constants(scenario)
     x, log_weights = cloud(width)
-    weigh_states(x, log_weights, state.network, state.reports.bitmap[0], NOBODY, 0, c)
+    weigh_states(x, log_weights, state, state.reports.bitmap[0], NOBODY, cs)
     everyone = np.zeros(500)
     for node in np.flatnonzero(awake):
         one = np.zeros(500, np.float32)
-        weigh_state(x, one, state.network.positions[0, node], state.reports.bitmap[0, node] != 0, 0.0, c)
+        value = np.array([state.reports.bitmap[0, node], 0.0])
+        weigh_state(x, one, state.network.positions[0], node, value, cs)
         everyone += one
     difference = everyone - log_weights
     np.testing.assert_allclose(difference, difference[0], atol=2e-3)
@@ -227,17 +247,17 @@ def test_nodes_that_are_left_out_would_have_told_all_particles_the_same(width):
 def test_who_sleeps_or_is_dead_tells_nothing():
     scenario = scene(particles=500)
     *_, (awake, state, _) = play(scenario, some)
-    c, (x, ours), (_, theirs) = constants(scenario)[0], cloud(5.0), cloud(5.0)
-    weigh_states(x, ours, state.network, state.reports.bitmap[0], NOBODY, 0, c)
+    cs, (x, ours), (_, theirs) = constants(scenario), cloud(5.0), cloud(5.0)
+    weigh_states(x, ours, state, state.reports.bitmap[0], NOBODY, cs)
     dead = np.flatnonzero(awake)[3:9]
     bitmap = np.where(awake, state.reports.bitmap[0], 1 - state.reports.bitmap[0])
-    weigh_states(x, theirs, state.network, bitmap, NOBODY, 0, c)
+    weigh_states(x, theirs, state, bitmap, NOBODY, cs)
     np.testing.assert_array_equal(ours, theirs)
     state.network.battery[0, dead] = 0.0
     ours[:], theirs[:] = 0, 0
-    weigh_states(x, ours, state.network, bitmap, NOBODY, 0, c)
+    weigh_states(x, ours, state, bitmap, NOBODY, cs)
     bitmap[dead] = 1 - bitmap[dead]
-    weigh_states(x, theirs, state.network, bitmap, NOBODY, 0, c)
+    weigh_states(x, theirs, state, bitmap, NOBODY, cs)
     np.testing.assert_array_equal(ours, theirs)
 
 
@@ -270,4 +290,4 @@ def test_a_tracker_and_its_measurement_may_change_together():
     binary = Scenario.named("Binary-v0", tracker="boundary")
     assert binary.override(measurement="rssi", tracker="ekf").tracking.tracker == "ekf"
     for name in BOUNDARY_TRACKERS:
-        assert Scenario.named("PreDC-v0", measurement="binary", tracker=name).binary
+        assert Scenario.named("PreDC-v0", measurement="binary", tracker=name).measurement.reports_state

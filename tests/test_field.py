@@ -6,18 +6,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wsn_env import Scenario, ScenarioError, World
-from wsn_env.models.physics.field import index, nearest
-from wsn_env.models.state import State
+from wsn_env.models.state import Grid, Network
+from wsn_env.simulation.geometry import index, nearest
 
 
 def network_of(positions, battery=None):
     """A network of one row."""
-    state = State.zeros(1, len(positions), periods=1, particles=0)
-    network = state.network
+    side = Grid.side(len(positions))
+    network = Network.zeros(rows=1, nodes=len(positions), cells=side * side + 1)
+    network.grid.row["side"] = side
     network.positions[0] = positions
     network.battery[0] = 1.0 if battery is None else battery
     network.alive[:] = (network.battery > 0).sum(axis=1)
-    index(network.positions, network.grid)
+    index(network)
     return network
 
 

@@ -8,9 +8,9 @@ from tests.anchors import RING, everyone, play_subsets, ring_scenario
 from wsn_env import Cluster, Scenario, ScenarioError, World
 from wsn_env.filters.fingerprint import FingerprintMap, FingerprintNetwork, trained_network, training_of
 from wsn_env.filters.kalman import constant_velocity
+from wsn_env.filters.linear import LinearModel
 from wsn_env.filters.width import fruit_flies, golden_section
-from wsn_env.models.physics.field import fixed_positions
-from wsn_env.models.physics.sensing import expected_strengths
+from wsn_env.models.field import fixed_positions
 
 NODES = np.array(RING, float)
 ALL = np.arange(8)
@@ -104,7 +104,7 @@ def test_only_what_was_heard_is_compared(training):
 def test_more_anchors_fix_better_and_say_so(training):
     rng, net = np.random.default_rng(2), trained_network(ring_scenario())
     points = rng.uniform(0, 200, (500, 2))
-    strengths = expected_strengths(points, NODES, ring_scenario().measurement) + rng.normal(0, 3, (500, 8))
+    strengths = LinearModel(ring_scenario()).expected(points, NODES) + rng.normal(0, 3, (500, 8))
     rms, claimed = [], []
     for heard in (np.array([0, 3]), np.array([0, 3, 7]), ALL):
         fixes = [net.locate(heard, z[heard]) for z in strengths]

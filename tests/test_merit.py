@@ -9,8 +9,8 @@ from wsn_env import Scenario, View, World
 from wsn_env.compiled.kernels import kernel
 from wsn_env.envs.actions import MenuAction
 from wsn_env.envs.merit import gain
-from wsn_env.models.physics.constants import constants
 from wsn_env.models.state import KEEP_CLUSTER
+from wsn_env.scenario.constants import constants
 
 MOVE_WITH_ALL = 18  # the best node leads, the next eight follow
 

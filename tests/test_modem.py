@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from wsn_env import Cluster, Scenario, ScenarioError, World
-from wsn_env.models.sections import Modem, Radio
+from wsn_env.models.radio.modem import Modem
+from wsn_env.models.radio.radio import Radio
 
 SENSING, HANDOVER, INVITATION, REPORT, BROADCAST, SEARCH = range(6)
 PLACES = ((500, 500), (600, 500), (500, 700), (500, 760))  # 100, 200 and 260 m from node 0; 2 to 3: 60 m

@@ -8,12 +8,14 @@ from tests.worlds import leaves
 from wsn_env import Scenario, World, make_policy
 from wsn_env.compiled.kernels import fast
 from wsn_env.evaluation.rollout import episodes
-from wsn_env.filters import kernels, likelihood
+from wsn_env.filters import kernels
 from wsn_env.filters.particle import ParticleTracker
-from wsn_env.models.physics.constants import constants
-from wsn_env.models.physics.motion import predict_moments
-from wsn_env.models.physics.sensing import detection_probability
+from wsn_env.models.detection.base import weigh_detection, weigh_silence
+from wsn_env.models.measurement.base import node_at
+from wsn_env.models.motion.prediction import predict_moments
 from wsn_env.models.state import State
+from wsn_env.scenario.constants import constants
+from wsn_env.scenario.sensing import detection_probability
 
 NODES = np.array([[40.0, 50.0], [55.0, 45.0], [52.0, 60.0], [47.0, 41.0]])
 P0 = np.diag([1.0, 0.01, 1.0, 0.01])
@@ -36,7 +38,7 @@ class Filter:
         self.tracker = ParticleTracker(self.scenario, fast=fast)
         particles, self.rows, self.period = self.tracker.particles, rows, 0
         self.keys = np.arange(key, key + rows).astype(np.uint64)
-        self.state = State.zeros(rows, len(NODES), periods=1, particles=particles)
+        self.state = State.zeros(rows=rows, nodes=len(NODES), particles=particles)
         self.state.network.positions[:] = NODES
         self.belief = self.state.belief
         self.belief.mean[:], self.belief.cov[:] = start, cov
@@ -244,8 +246,8 @@ def test_fast_kernels_agree_to_rounding(measurement, fusion, particles):
 def test_fast_and_strict_kernels_have_caches_of_their_own():
     strict, quick = kernels.filter_rows, fast(kernels.filter_rows)
     assert quick is fast(kernels.filter_rows) and quick is not strict
-    assert type(quick._cache) is type(strict._cache)
-    assert quick.py_func.__qualname__ != strict.py_func.__qualname__  # the file's name
+    assert type(quick) is type(strict)
+    assert quick.py_func.__qualname__ != strict.py_func.__qualname__  # the folder's name
 
 
 # --- what detection and silence tell --------------------------------------------------------------------------
@@ -253,20 +255,21 @@ def test_fast_and_strict_kernels_have_caches_of_their_own():
 
 def teller(weigh_detection, weigh_silence):
     @numba.njit
-    def tell(x, log_weights, position, delivery, constants):
+    def tell(x, log_weights, positions, delivery, constants):
         """Weigh by a detection, or where `delivery` is not negative by silence."""
+        c, node = constants[0], node_at(positions, 0)
         if delivery < 0:
-            weigh_detection(x, log_weights, position, constants[0])
+            weigh_detection(c.detection, c.measurement, x, log_weights, node)
         else:
-            weigh_silence(x, log_weights, position, delivery, constants[0])
+            weigh_silence(c.detection, c.measurement, x, log_weights, node, delivery)
         return log_weights
 
     return tell
 
 
 TELLERS = {
-    "strict": teller(likelihood.weigh_detection, likelihood.weigh_silence),
-    "fast": teller(fast(likelihood.weigh_detection), fast(likelihood.weigh_silence)),
+    "strict": teller(weigh_detection, weigh_silence),
+    "fast": teller(weigh_detection.fast_twin, weigh_silence.fast_twin),
 }
 
 
@@ -286,19 +289,19 @@ def test_detection_and_silence_weigh_like_plain_numpy(detection, mode):
     """Distances are off by half an ulp, 2e-5 m at 300 m; p may change by a factor e within a decimetre."""
     scenario = Scenario.named("PreDC-v0", **detection)
     record, told = constants(scenario), TELLERS[mode]
-    inner, reach = record["inner_m"][0], record["reach_m"][0]
+    inner, reach = record["detection"]["inner_m"][0], record["detection"]["reach_m"][0]
     edges = np.array([0, inner, reach, 2 * reach, 1e6], np.float32)
     neighbours = np.nextafter(edges[1:3], np.float32(0)), np.nextafter(edges[1:3], np.float32(1e9))
     distances = np.concatenate([edges, *neighbours, np.linspace(0, 1.2 * reach, 10_000)]).astype(np.float32)
     x = np.zeros((4, len(distances)), np.float32)
     x[2] = distances
-    p = np.clip(detection_probability(distances.astype(float), scenario.detection), 1e-6, 1 - 1e-6)
+    p = np.clip(detection_probability(distances.astype(float), scenario), 1e-6, 1 - 1e-6)
     for delivery in (-1.0, 0.0, 0.8, 1.0):
-        weights = told(x, np.zeros(len(distances), np.float32), np.zeros(2), delivery, record)
+        weights = told(x, np.zeros(len(distances), np.float32), np.zeros((1, 2)), delivery, record)
         exact = np.log(p) if delivery < 0 else np.log1p(-delivery * p)
         assert (weights <= 0).all()
         np.testing.assert_allclose(weights, exact, atol=1e-4)
-    again = told(x, weights.copy(), np.zeros(2), 1.0, record)
+    again = told(x, weights.copy(), np.zeros((1, 2)), 1.0, record)
     np.testing.assert_allclose(again, 2 * weights, rtol=1e-6)  # added, not set
 
 
@@ -318,7 +321,7 @@ def test_every_awake_node_weighs_by_its_report_or_by_its_silence(nodes, receiver
     x, weights = filter.belief.particles[0], filter.belief.log_weights[0]
     exact = np.zeros(300)
     for node in (2, 0, 3):
-        p = detection_probability(np.hypot(*(x[::2].T - NODES[node]).T), filter.scenario.detection)
+        p = detection_probability(np.hypot(*(x[::2].T - NODES[node]).T), filter.scenario)
         p = np.clip(p, 1e-6, 1 - 1e-6)
         exact += np.log(p) if node in nodes else np.log1p(-p * (1 if (node, receiver) == (2, "head") else 0.7))
     np.testing.assert_allclose(weights, exact - exact.max(), atol=1e-4)
@@ -465,13 +468,13 @@ def test_a_collapsed_start_is_a_point():
 def test_relocation_keeps_velocities_and_weights():
     filter = Filter(rows=2, particles=5000, resample_below=0)
     filter.step([(0, 49.0, 50.0)])
-    before = [array.copy() for array in filter.belief]
+    before = filter.belief.copy()
     belief = filter.belief
     belief.mean[:, ::2], belief.cov[:] = [20.0, 70.0], np.diag([25.0, 0.01, 9.0, 0.01])
     filter.tracker.relocate(filter.keys, np.ones(2, int), np.array([False, True]), belief)
-    np.testing.assert_array_equal(belief.particles[0], before[1][0])
-    np.testing.assert_array_equal(belief.particles[:, 1::2], before[1][:, 1::2])
-    np.testing.assert_array_equal(belief.log_weights, before[2])
+    np.testing.assert_array_equal(belief.particles[0], before.particles[0])
+    np.testing.assert_array_equal(belief.particles[:, 1::2], before.particles[:, 1::2])
+    np.testing.assert_array_equal(belief.log_weights, before.log_weights)
     x, y = belief.particles[1, 0].astype(float), belief.particles[1, 2].astype(float)
     for z, mean, sd in ((x, 20, 5), (y, 70, 3)):
         assert abs(z.mean() - mean) < 4 * sd / 5000**0.5

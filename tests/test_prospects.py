@@ -1,5 +1,6 @@
 """What the menu's entries promise is what comes, on average over the targets that the belief holds possible."""
 
+import numba
 import numpy as np
 import pytest
 
@@ -9,8 +10,8 @@ from wsn_env.envs.actions import MENU_ENTRIES
 from wsn_env.envs.features import BELIEF_FEATURES
 from wsn_env.envs.interface import Interface, Settings
 from wsn_env.envs.prospects import ENTRY_FEATURES
-from wsn_env.models.physics.constants import constants
-from wsn_env.models.physics.sensing import mean_detection
+from wsn_env.models.measurement.base import chance, node_at
+from wsn_env.scenario.constants import constants
 
 ROWS = 4000
 ENTRIES = (0, 1, 3, 6, 10, 12, 15, 19, 22)  # as it is; head kept, moved to the best, moved ahead
@@ -32,11 +33,8 @@ def possible_worlds(scenario, sd_m=0.3):
         state, _ = world.step(state, interface.action.cluster(np.array([action]), View.of(state)))
     rows = world.reset([draws.key_of_seed(100 + i) for i in range(ROWS)])
     for mine, one in ((rows.network, state.network), (rows.belief, state.belief)):
-        for array, value in zip(mine, one):
-            if isinstance(array, np.ndarray):
-                array[:] = value[0]
-    for array, value in zip(rows.network.grid, state.network.grid):
-        array[:] = value[0]
+        for (_, array), (_, value) in zip(mine.leaves(), one.leaves(), strict=True):
+            array[:] = value[0]
     rng = np.random.default_rng(0)
     rows.row[:] = state.row[0]
     cov = np.diag([sd_m**2, 1e-4, sd_m**2, 1e-4])
@@ -66,19 +64,23 @@ def test_energy_silence_and_detections_come_as_promised(name, sd_m):
             assert abs(values.mean() - expected) < 4 * se + 0.03 * abs(expected) + 1e-6, (entry, expected)
 
 
+@numba.njit
+def chance_of(cs, positions, node, x, y, xx, xy, yy):
+    return chance(cs[0].measurement, node_at(positions, node), x, y, xx, xy, yy, cs[0])
+
+
 def test_the_expected_sd_is_that_of_a_kalman_filter_whose_reports_may_be_missed():
     scenario = Scenario.named("PreDC-v0", lam=3.0)
     state = World(scenario, threads=1).reset([draws.key_of_seed(3)])
     promised = prospects(scenario, View.of(state))
     p = state.belief.predicted_cov[0][::2, ::2]
-    view = View.of(state)
+    view, cs = View.of(state), constants(scenario)
     for n in range(9):
         after = p.copy()
         for node in view.nearest(12)[0][0, : n + 1]:
-            offset = view.prediction[0] - view.positions[0, node]
-            chance = mean_detection(*offset, p[0, 0], p[0, 1], p[1, 1], constants(scenario)[0])
+            heard = chance_of(cs, view.positions[0], node, *view.prediction[0], p[0, 0], p[0, 1], p[1, 1])
             noise = scenario.measurement.noise_m**2 * np.eye(2)
-            after = after - chance * after @ np.linalg.inv(after + noise) @ after
+            after = after - heard * after @ np.linalg.inv(after + noise) @ after
         assert promised["sd"][0, 10 + n] == pytest.approx(0.5 * np.log(np.trace(after)), abs=1e-5)
         assert promised["sd_drop"][0, 10 + n] == pytest.approx(0.5 * np.log(np.trace(after) / np.trace(p)), abs=1e-5)
         mean_error = promised["error_cost"][0, 10 + n] * scenario.typical_cost(3.0)

@@ -9,6 +9,7 @@ from wsn_env import Cluster, Scenario, World
 from wsn_env.compiled import draws
 from wsn_env.compiled.kernels import fast
 from wsn_env.filters import kernels, resampling
+from wsn_env.models.state import belief_at
 
 COV = np.array([[4.0, 0.6, 1.0, 0.1], [0.6, 0.3, 0.2, 0.0], [1.0, 0.2, 2.0, -0.4], [0.1, 0.0, -0.4, 0.5]])
 
@@ -131,14 +132,14 @@ def test_fast_kernels_spread_alike():
 
 def test_a_cloud_redrawn_has_the_mean_and_covariance_handed_over():
     @numba.njit
-    def redraw(key, belief):
-        kernels.redraw_row(np.uint64(key), 5, belief, 0)
+    def redraw(key, handle):
+        kernels.redraw_row(np.uint64(key), 5, belief_at(handle), 0)
 
     filter = Filter(particles=40_000)
     belief = filter.belief
     belief.mean[:], belief.cov[:] = [300.0, -1.0, 20.0, 0.5], COV
     belief.log_weights[:] = -3
-    redraw(7, belief)
+    redraw(7, belief.handle)
     cloud = belief.particles[0].T.astype(float)
     doubt = np.sqrt((np.outer(np.diag(COV), np.diag(COV)) + COV**2) / len(cloud))
     assert (np.abs(np.cov(cloud.T) - COV) < 4 * doubt).all()

@@ -7,13 +7,16 @@ from scipy import stats
 
 from wsn_env import Cluster, Scenario, World
 from wsn_env.compiled import draws
-from wsn_env.models.physics import sensing
-from wsn_env.models.physics.constants import constants
-from wsn_env.models.sections import Detection
+from wsn_env.models.detection.base import mean_probability
+from wsn_env.models.detection.radius import Detection
+from wsn_env.models.measurement.base import log_miss, node_at
+from wsn_env.models.measurement.base import sample as measure
+from wsn_env.scenario.constants import constants
+from wsn_env.scenario.sensing import detection_probability, joint_detection_probability
 
 
 def test_detection_probability_with_table_1():
-    p = sensing.detection_probability([0.0, 8.0, 10.0, 11.9, 12.0, 1e6], Detection())
+    p = detection_probability([0.0, 8.0, 10.0, 11.9, 12.0, 1e6], Scenario())
     assert p[0] == p[1] == 0.6
     assert p[2] == pytest.approx(0.0812, abs=5e-5)  # 0.6 exp(-2**3 / 2**2)
     assert p[2] == pytest.approx(0.6 * np.exp(-2), rel=1e-14)
@@ -36,26 +39,31 @@ def test_detection_probability_against_its_formula(detection):
     with np.errstate(all="ignore"):
         between = detection.ceiling * np.exp(-detection.decay * a1**detection.decay_power / a2**detection.edge_power)
     formula = np.where(a1 <= 0, detection.ceiling, np.where(a2 <= 0, 0, between))
-    p = sensing.detection_probability(d, detection)
+    p = detection_probability(d, Scenario(detection=detection))
     np.testing.assert_allclose(p, formula, rtol=1e-11, atol=1e-290)
     if detection.decay > 0:
         assert (np.diff(p) <= 0).all()
 
 
 def test_detection_probability_keeps_the_shape():
-    distance = np.linspace(0, 20, 24).reshape(2, 3, 4)
-    p = sensing.detection_probability(distance, Detection())
+    distance, scenario = np.linspace(0, 20, 24).reshape(2, 3, 4), Scenario()
+    p = detection_probability(distance, scenario)
     assert p.shape == (2, 3, 4)
-    assert p[1, 2, 3] == sensing.detection_probability(distance[1, 2, 3], Detection())
-    np.testing.assert_array_equal(sensing.detection_probability(distance[:, :, ::2], Detection()), p[:, :, ::2])
+    assert p[1, 2, 3] == detection_probability(distance[1, 2, 3], scenario)
+    np.testing.assert_array_equal(detection_probability(distance[:, :, ::2], scenario), p[:, :, ::2])
 
 
 def test_joint_detection_probability():
-    three, two = sensing.joint_detection_probability([[0.6, 0.6, 0.6], [0.6, 0.6, 0.0]])
+    three, two = joint_detection_probability([[0.6, 0.6, 0.6], [0.6, 0.6, 0.0]])
     assert three == pytest.approx(1 - 0.4**3) and three > 0.9  # 0.936
     assert two == pytest.approx(0.84) and two < 0.9
-    assert sensing.joint_detection_probability([[1.0, 0.3]]) == 1
-    assert sensing.joint_detection_probability([[0.0, 0.0]]) == 0
+    assert joint_detection_probability([[1.0, 0.3]]) == 1
+    assert joint_detection_probability([[0.0, 0.0]]) == 0
+
+
+@numba.njit
+def mean_detection(dx, dy, xx, xy, yy, cs):
+    return mean_probability(cs[0].detection, cs[0].measurement, dx, dy, xx, xy, yy)
 
 
 @pytest.mark.parametrize(
@@ -69,7 +77,7 @@ def test_joint_detection_probability():
 )
 def test_mean_detection_is_that_of_targets_drawn_from_the_belief(changes, within):
     scenario = Scenario.named("PreDC-v0", **changes)
-    c, radius, rng = constants(scenario)[0], scenario.radius_m, np.random.default_rng(0)
+    cs, radius, rng = constants(scenario), scenario.radius_m, np.random.default_rng(0)
     for width, rms in zip((0.3, 1.0), within):
         deviations = []
         for _ in range(100):
@@ -78,8 +86,8 @@ def test_mean_detection_is_that_of_targets_drawn_from_the_belief(changes, within
             cov = root @ root.T
             cov *= (width * radius * rng.uniform(0, 1)) ** 2 / np.trace(cov)
             targets = offset + rng.normal(size=(4000, 2)) @ np.linalg.cholesky(cov).T
-            drawn = sensing.detection_probability(np.hypot(*targets.T), scenario.detection, scenario.measurement).mean()
-            deviations.append(sensing.mean_detection(*offset, cov[0, 0], cov[0, 1], cov[1, 1], c) - drawn)
+            drawn = detection_probability(np.hypot(*targets.T), scenario).mean()
+            deviations.append(mean_detection(*offset, cov[0, 0], cov[0, 1], cov[1, 1], cs) - drawn)
         assert np.mean(np.square(deviations)) ** 0.5 < rms  # 4,000 draws: .003 (rms)
 
 
@@ -91,15 +99,15 @@ def test_mean_detection_of_a_sharp_belief_is_the_probability_there(changes, with
     """Exactly so for a threshold; the edge of eqs. 2-3 is taken for a normal distribution function."""
     scenario = Scenario.named("PreDC-v0", **changes)
     for distance in np.linspace(0.5, 13.0, 101):
-        there = sensing.detection_probability(distance, scenario.detection, scenario.measurement)
-        mean = sensing.mean_detection(distance, 0.0, 1e-12, 0.0, 1e-12, constants(scenario)[0])
+        there = detection_probability(distance, scenario)
+        mean = mean_detection(distance, 0.0, 1e-12, 0.0, 1e-12, constants(scenario))
         assert abs(mean - there) < within
 
 
 def test_mean_detection_tells_hopeless_nodes_apart():
     """So that a cluster for a lost target is not made of any nodes that cannot hear it."""
-    c = constants(Scenario.named("PreDC-v0"))[0]
-    chances = [sensing.mean_detection(distance, 0.0, 1.0, 0.0, 1.0, c) for distance in np.arange(10.0, 30.0)]
+    cs = constants(Scenario.named("PreDC-v0"))
+    chances = [mean_detection(distance, 0.0, 1.0, 0.0, 1.0, cs) for distance in np.arange(10.0, 30.0)]
     assert (np.diff(chances) < 0).all() and chances[-1] > 0
 
 
@@ -107,7 +115,8 @@ def test_mean_detection_tells_hopeless_nodes_apart():
 def measured(cs, target, positions, count):
     out = np.empty((count, 2))
     for i in range(count):
-        sensing.measure(np.uint64(1), i, 0, positions, (target[0], target[2]), cs[0], out[i])
+        stream = draws.stream(np.uint64(1), i, draws.MEASUREMENT)
+        out[i] = measure(cs[0].measurement, stream, 0, node_at(positions, 0), target[0], target[2])
     return out
 
 
@@ -178,7 +187,7 @@ def test_nodes_detect_as_often_as_their_probability_says():
 
 @pytest.mark.parametrize("ceiling", [1.0, 0.6])
 def test_the_probability_of_silence_against_sampling(ceiling):
-    """log_miss_probability averages over the belief; a wide belief is compared with a Monte Carlo mean."""
+    """log_miss averages over the belief; a wide belief is compared with a Monte Carlo mean."""
     scenario = Scenario.named("PreDC-v0", ceiling=ceiling, packet_success=0.5, retries=0)
     positions = np.array([[50.0, 50.0], [53.0, 58.0], [45.0, 57.0]])
     cov = np.zeros((4, 4))
@@ -186,7 +195,7 @@ def test_the_probability_of_silence_against_sampling(ceiling):
     mean = np.array([51.0, 0, 52.0, 0])
     got = silence(mean, cov, positions, np.array([1, 2], np.int32), 2, 0, constants(scenario))
     points = np.random.default_rng(0).multivariate_normal(mean[[0, 2]], cov[np.ix_([0, 2], [0, 2])], 40_000)
-    p = sensing.detection_probability(np.linalg.norm(points[:, None] - positions, axis=2), scenario.detection)
+    p = detection_probability(np.linalg.norm(points[:, None] - positions, axis=2), scenario)
     missed = np.prod(1 - p * [1, 0.5, 0.5], axis=1)
     slack = 0.02 * missed.mean()  # the quadrature's own error where the edge bends within the belief
     assert abs(np.exp(got) - missed.mean()) < 4 * missed.std() / len(points) ** 0.5 + slack + 1e-12
@@ -194,7 +203,7 @@ def test_the_probability_of_silence_against_sampling(ceiling):
 
 @numba.njit
 def silence(mean, cov, positions, nodes, count, head, cs):
-    return sensing.log_miss_probability(mean, cov, positions, nodes, count, head, cs[0])
+    return log_miss(cs[0].measurement, mean, cov, positions, head, nodes, count, cs[0])
 
 
 def test_the_probability_of_silence_when_nobody_is_awake():

@@ -7,11 +7,15 @@ from scipy.stats import norm
 
 from tests.test_particle import NODES, Filter
 from wsn_env import Cluster, Scenario, ScenarioError, World
-from wsn_env.compiled.kernels import fast
-from wsn_env.filters import likelihood
-from wsn_env.models.physics.constants import constants
-from wsn_env.models.physics.sensing import detection_probability
-from wsn_env.models.sections import Detection, Position, Rssi, Sonar, Threshold
+from wsn_env.models.detection.base import weigh_silence
+from wsn_env.models.detection.radius import Detection
+from wsn_env.models.detection.threshold import Threshold
+from wsn_env.models.measurement.base import node_at
+from wsn_env.models.measurement.position import Position
+from wsn_env.models.measurement.rssi import Rssi
+from wsn_env.models.measurement.sonar import Sonar
+from wsn_env.scenario.constants import constants
+from wsn_env.scenario.sensing import detection_probability
 
 UNDERWATER = Scenario.named("Underwater-v0")
 ALPHA = 1.18703e-3
@@ -37,7 +41,7 @@ def test_detection_probability_is_the_normal_distributions(measurement):
     threshold = Threshold(measurement.mean_db(40.0))
     d = np.concatenate([[0.0, measurement.floor_m, 40.0], np.linspace(0.0, 400.0, 3001)])
     mean = np.array([measurement.mean_db(x) for x in d])
-    p = detection_probability(d, threshold, measurement)
+    p = detection_probability(d, Scenario(detection=threshold, measurement=measurement))
     exact = norm.cdf((mean - threshold.threshold_db) / measurement.noise_db)
     np.testing.assert_allclose(p, np.where(exact < 1e-6, 0, exact), rtol=1e-9, atol=2e-6 * (exact < 1.1e-6).max())
     assert p[2] == pytest.approx(0.5, abs=1e-9)
@@ -82,16 +86,17 @@ def test_nodes_report_as_often_as_their_probability_says():
         assert abs(heard[node] / n - p) <= 4 * (p * (1 - p) / n) ** 0.5
 
 
-def quiet(weigh_quiet):
+def quiet(weigh_silence):
     @numba.njit
-    def tell(x, log_weights, position, delivery, constants):
-        weigh_quiet(x, log_weights, position, delivery, constants[0])
+    def tell(x, log_weights, positions, delivery, constants):
+        c = constants[0]
+        weigh_silence(c.detection, c.measurement, x, log_weights, node_at(positions, 0), delivery)
         return log_weights
 
     return tell
 
 
-@pytest.mark.parametrize("weigh", [likelihood.weigh_quiet, fast(likelihood.weigh_quiet)], ids=["strict", "fast"])
+@pytest.mark.parametrize("weigh", [weigh_silence, weigh_silence.fast_twin], ids=["strict", "fast"])
 @pytest.mark.parametrize("changes", [{}, {"noise_db": 0.2}, {"measurement": Rssi(), "threshold_db": -70.0}])
 def test_silence_weighs_like_plain_numpy(changes, weigh):
     scenario = UNDERWATER.override(**changes)
@@ -102,11 +107,11 @@ def test_silence_weighs_like_plain_numpy(changes, weigh):
     z = (threshold_db - np.array([m.mean_db(float(d)) for d in distances])) / m.noise_db
     for delivery in (1.0, 0.8, 0.0):
         exact = norm.logcdf(z) if delivery == 1 else np.log1p(-delivery * norm.sf(z))
-        weights = quiet(weigh)(x, np.zeros(len(distances), np.float32), np.zeros(2), delivery, constants(scenario))
+        weights = quiet(weigh)(x, np.zeros(len(distances), np.float32), np.zeros((1, 2)), delivery, constants(scenario))
         assert (weights <= 0).all() and np.isfinite(weights).all()
         slack = 2e-5 / m.noise_db * np.maximum(1, np.abs(z)) * (z < 8)  # levels of 120 dB are off by half an ulp
         assert (np.abs(weights - exact) <= 1e-6 + 1e-6 * np.abs(exact) + slack).all()
-        again = quiet(weigh)(x, weights.copy(), np.zeros(2), delivery, constants(scenario))
+        again = quiet(weigh)(x, weights.copy(), np.zeros((1, 2)), delivery, constants(scenario))
         np.testing.assert_allclose(again, 2 * weights, rtol=1e-6)  # added, not set
 
 
@@ -165,7 +170,7 @@ def test_bad_thresholds_are_refused(overrides, says):
 
 def test_a_threshold_without_a_level_has_no_probability():
     with pytest.raises(ScenarioError, match="needs a measured level"):
-        detection_probability(10.0, Threshold(), Position())
+        Threshold().distances_m(Position())
 
 
 def test_sections_that_only_fit_together_change_together():

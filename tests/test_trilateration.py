@@ -6,8 +6,8 @@ from scipy.optimize import least_squares
 
 from tests.anchors import RING, everyone, play_subsets, ring_scenario, tell
 from wsn_env import Cluster, Scenario, ScenarioError, World
-from wsn_env.filters.trilateration import squared_ranges, trilaterate
-from wsn_env.models.physics.sensing import expected_strengths
+from wsn_env.filters.linear import LinearModel
+from wsn_env.filters.trilateration import trilaterate
 
 NODES = np.array(RING, float)
 
@@ -33,49 +33,45 @@ def test_too_few_nodes_or_nodes_on_a_line_fix_nothing(chosen):
     assert trilaterate(NODES[chosen], np.ones(len(chosen)), np.ones(len(chosen))) is None
 
 
-@pytest.mark.parametrize("kind", ["rssi", "rssi_power"])
-def test_ranges_turn_the_strength_law_round(kind):
-    measurement = Scenario.named("PreDC-v0", measurement=kind).measurement
+@pytest.mark.parametrize(
+    "overrides", [dict(measurement="rssi", noise_db=1e-9), dict(measurement="rssi_power", noise=1e-9)]
+)
+def test_ranges_turn_the_strength_law_round(overrides):
+    scenario = Scenario.named("PreDC-v0", **overrides)
     point = np.array([60.0, 30.0])
-    strengths = expected_strengths(point, NODES, measurement)
-    squared, sd = squared_ranges(strengths, measurement, 1e-9, 1e4)
+    strengths = LinearModel(scenario).expected([point], NODES)[0]
+    squared, sd = scenario.measurement.squared_ranges(strengths, 1e4)
     np.testing.assert_allclose(squared, ((NODES - point) ** 2).sum(axis=1), rtol=1e-9)
-    nearby, _ = squared_ranges(strengths + 1e-9, measurement, 1e-9, 1e4)
+    nearby, _ = scenario.measurement.squared_ranges(strengths + 1e-9, 1e4)
     np.testing.assert_allclose(np.abs(nearby - squared), sd, rtol=1e-3)
 
 
 def test_a_power_below_nothing_comes_from_afar():
     measurement = Scenario.named("PreDC-v0", measurement="rssi_power").measurement
-    squared, sd = squared_ranges(np.array([-1.0, 0.0]), measurement, 0.2, 500.0)
+    squared, sd = measurement.squared_ranges(np.array([-1.0, 0.0]), 500.0)
     np.testing.assert_allclose(squared, 500.0**2)
     assert np.isfinite(sd).all()
 
 
 def test_its_covariance_is_that_of_small_noise():
     rng, point = np.random.default_rng(3), np.array([70.0, 120.0])
-    measurement = ring_scenario().measurement
-    level = expected_strengths(point, NODES, measurement)
-    found = np.array(
-        [
-            trilaterate(NODES, *squared_ranges(level + rng.normal(0, 0.1, 8), measurement, 0.1, 1e4))[0]
-            for _ in range(2000)
-        ]
-    )
-    _, cov = trilaterate(NODES, *squared_ranges(level, measurement, 0.1, 1e4))
+    scenario = ring_scenario(noise_db=0.1)
+    ranges, level = scenario.measurement.squared_ranges, LinearModel(scenario).expected([point], NODES)[0]
+    found = np.array([trilaterate(NODES, *ranges(level + rng.normal(0, 0.1, 8), 1e4))[0] for _ in range(2000)])
+    _, cov = trilaterate(NODES, *ranges(level, 1e4))
     np.testing.assert_allclose(np.cov(found.T), cov, atol=0.12 * cov.max())
 
 
 def test_nonlinear_least_squares_finds_scipys_minimum():
     scenario = ring_scenario(tracker="nonlinear_ls", noise_db=1.0)
+    model = LinearModel(scenario)
     compared = 0
     for k, state in enumerate(play_subsets(scenario, [1])):
         nodes, values = tell(state)
         if k == 0 or len(nodes) < 3 or trilaterate(nodes, values[:, 0], values[:, 0]) is None:
             continue
         mean = state.belief.mean[0, ::2]
-        best = least_squares(
-            lambda x, nodes=nodes, z=values[:, 0]: expected_strengths(x, nodes, scenario.measurement) - z, mean
-        )
+        best = least_squares(lambda x, nodes=nodes, z=values[:, 0]: model.expected([x], nodes)[0] - z, mean)
         if (best.x > 0).all() and (best.x < 200).all():
             np.testing.assert_allclose(mean, best.x, atol=0.05)
             np.testing.assert_allclose(state.belief.cov[0, ::2, ::2], np.linalg.inv(best.jac.T @ best.jac), rtol=0.05)

@@ -6,7 +6,7 @@ episode, and nothing of the target enters.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -166,7 +166,7 @@ _training = lru_cache(maxsize=8)(Training)
 
 def _relevant(scenario: Scenario) -> Scenario:
     """The scenario without what a map does not hang on, so that like ones share theirs."""
-    tracking = replace(Tracking(), tracker=scenario.tracking.tracker, training_seed=scenario.tracking.training_seed)
+    tracking = Tracking(training_seed=scenario.tracking.training_seed)
     own = dict(field=scenario.field, measurement=scenario.measurement, detection=scenario.detection)
     return Scenario(name="fingerprints", period_s=3600.0, tracking=tracking, **own)
 

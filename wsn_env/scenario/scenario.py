@@ -105,6 +105,7 @@ class Scenario(Section):
             raise ScenarioError(f"Scenario.lam = {self.lam!r}: must be at least 0 m/mJ, or a pair 0 < low <= high")
         for kind in (self.detection, self.measurement, self.radio):
             kind.check(self)
+        self.motion.check_measurement(self.measurement)
 
     def _check_tracker(self) -> None:
         name, kind = self.tracking.tracker, type(self.measurement)

@@ -101,6 +101,7 @@ class Tracks:
 
     def __init__(self, scenario: Scenario):
         motion = scenario.motion
+        motion.check(scenario)
         self._motion = np.zeros(1, constants_type(motion, scenario))
         fill_constants(self._motion, motion, scenario)
         side_m, depth_m = scenario.field.room_m

@@ -46,7 +46,10 @@ class Motion(Kind):
         return None
 
     def check(self, scenario) -> None:
-        """Raise ScenarioError where it does not fit the rest of the scenario."""
+        """Raise ScenarioError where field or horizon leave it no room; asked when a world is made."""
+
+    def check_measurement(self, measurement) -> None:
+        """Raise ScenarioError where nodes must measure something else; asked when a scenario is made."""
 
     def horizon(self, period_s: float) -> int | None:
         """How many periods it lasts; None: as many as one likes."""

@@ -31,11 +31,11 @@ class Replay(RecordedMotion):
             raise ScenarioError("Replay.recording = '': must name a file such as straight_01_all_sensors.mbd")
         super().__post_init__()
 
-    def check(self, scenario) -> None:
+    def check_measurement(self, measurement) -> None:
         """Packets are for receivers of a beacon."""
-        if not scenario.measurement.lasting_errors:
+        if not measurement.lasting_errors:
             raise ScenarioError(
-                f"Scenario.measurement = {type(scenario.measurement).__name__}: must be Beacon with the motion 'replay'"
+                f"Scenario.measurement = {type(measurement).__name__}: must be Beacon with the motion 'replay'"
             )
 
     def horizon(self, period_s: float) -> int | None:
