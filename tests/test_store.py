@@ -70,8 +70,7 @@ def test_what_is_compiled_is_what_has_changed(folder):
     assert run(folder)[0] == ["6.0", "7.0", "first", "second"]
     assert run(folder)[0] == ["6.0", "7.0"]
     edit(folder / "work.py", "Scales.", "Scales,\n    in other words.")
-    edit(folder / "pieces.py", "What it does.", "Another docstring,
-    of two lines.")
+    edit(folder / "pieces.py", "What it does.", "Another docstring,\n    of two lines.")
     edit(folder / "pieces.py", "return FACTOR * x", "return FACTOR * x  # a comment")
     edit(folder / "numbers_of.py", '"""Constants."""', '"""Numbers."""\n\nUNUSED = 7')
     assert run(folder)[0] == ["6.0", "7.0"]
@@ -162,8 +161,8 @@ def test_without_compiling_the_same_comes_out(folder):
 
 
 def test_it_imports_where_processes_do_not_fork(folder):
-    code = "import os, gymnasium, numba, scipy; del os.register_at_fork; import wsn_env.cli, wsn_env.envs.env; print('well')"
-    assert run(folder, "-c", code)[0] == ["well"]
+    code = "import os, gymnasium, numba, scipy; del os.register_at_fork; import wsn_env.cli, wsn_env.envs.env"
+    assert run(folder, "-c", f"{code}; print('well')")[0] == ["well"]
 
 
 def test_a_store_that_cannot_be_written_is_done_without(folder):

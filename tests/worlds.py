@@ -15,7 +15,7 @@ from wsn_env.scenario.tracking import BOUNDARY_TRACKERS, reads
 TRACKERS = ("particle", "particle", "particle", "ekf", "ukf", "ickf", "snapshot", *BOUNDARY_TRACKERS)
 MOTIONS = ["crossing", "straight", "sine", "circle", "turns", "waypoint"]
 MODEM_J = 5000.0  # a modem's packets cost so many times a radio's
-AT_1M_DB = {"rssi": -40.0, "sonar": 120.0}
+SOURCE_DB = 120.0
 KEYS = st.integers(0, 2**64 - 1)
 
 
@@ -23,7 +23,7 @@ KEYS = st.integers(0, 2**64 - 1)
 def scenarios(draw, trackers=TRACKERS, modem_hops_m=(30.0, 70.0, 250.0), **fixed):
     """Small scenarios of every kind: lossy, short of energy, lost from the start, without any noise in the filter.
 
-    A third have modems, with batteries (given ones, too) MODEM_J times as large.
+    All with sonars and some others have modems, with batteries (given ones, too) MODEM_J times as large.
     """
     readable = {name: [t for t in trackers if reads(t, kind())] for name, kind in MEASUREMENTS.kinds.items()}
     measurement = fixed.get("measurement", draw(st.sampled_from([name for name in readable if readable[name]])))
@@ -50,8 +50,9 @@ def scenarios(draw, trackers=TRACKERS, modem_hops_m=(30.0, 70.0, 250.0), **fixed
         search=draw(st.sampled_from([True, True, False])),
         search_gap=draw(st.integers(1, 6)),
     )
-    if measurement in AT_1M_DB and "radius_m" not in fixed and draw(st.booleans()):
-        overrides |= draw(threshold(AT_1M_DB[measurement]))
+    # Each three kinds that meet are compiled apart, so not all of them do.
+    if measurement == "sonar" and "radius_m" not in fixed:
+        overrides |= draw(threshold(SOURCE_DB))
     else:
         overrides |= dict(radius_m=draw(st.sampled_from([3.0, 10.0, 40.0])), ceiling=draw(st.sampled_from([0.6, 1.0])))
     if measurement == "binary":
@@ -67,7 +68,7 @@ def scenarios(draw, trackers=TRACKERS, modem_hops_m=(30.0, 70.0, 250.0), **fixed
     if isinstance(overrides.get("at_1m_db"), tuple):
         overrides["at_1m_db"] = overrides["at_1m_db"][: overrides["nodes"]]
     overrides |= fixed
-    if draw(st.sampled_from([False, False, True])):
+    if measurement == "sonar" or (measurement == "position" and draw(st.booleans())):
         overrides |= dict(radio="modem", hop_m=draw(st.sampled_from(modem_hops_m)), receiver="head")
         overrides["battery_j"] *= MODEM_J
     else:

@@ -60,7 +60,7 @@ def compile_job(job: Job) -> int:
     from wsn_env.simulation.world import World
 
     before = len(store.compiled)
-    small = {"particles": 20, "periods": 3}
+    small = {"particles": 20, "periods": 4}
     for order, observation in (("nearest", "candidates"), ("information", "menu")):
         for fast in (False, True) if job.fast else (False,):
             pictures = {"render_mode": "rgb_array", "frame_px": 64}
