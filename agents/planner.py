@@ -1,13 +1,8 @@
-"""A policy that looks ahead: it plays its choices in worlds drawn from the belief, and takes what comes cheapest.
-
-`python -m wsn_env.agents.planner --scenario Rssi-v0 --episodes 200` compares it with the fixed clusters and prints what
-a decision costs.
-"""
+"""A policy that looks ahead: it plays its choices in worlds drawn from the belief, and takes what comes cheapest."""
 
 from __future__ import annotations
 
-import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -18,13 +13,10 @@ from wsn_env.agents.imagined import draw_worlds, imagined_world, place_nodes, ro
 from wsn_env.agents.nearest import Nearest
 from wsn_env.envs.actions import MENU_MEMBERS, MenuAction
 from wsn_env.envs.rewards import belief_cost
-from wsn_env.evaluation.comparison import evaluate
-from wsn_env.evaluation.policies import Policy, make_policy
-from wsn_env.evaluation.progress import progress_bar
+from wsn_env.evaluation.policies import Policy
 from wsn_env.evaluation.rollout import rollout
 from wsn_env.models.quantity import check_quantity
 from wsn_env.models.state import Cluster, State
-from wsn_env.scenario import Scenario
 from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World
 
@@ -166,72 +158,3 @@ def _in_doubt(costs: np.ndarray, doubt: float) -> np.ndarray:
     differences = pairs - pairs[pairs.mean(axis=1).argmin()]
     errors = differences.std(axis=1) / max(pairs.shape[1] - 1, 1) ** 0.5
     return differences.mean(axis=1) <= doubt * errors
-
-
-class Timed:
-    """A policy with a stopwatch."""
-
-    def __init__(self, policy: Policy):
-        self.policy = policy
-        self.sees_lam = getattr(policy, "sees_lam", True)
-        self.seconds, self.decisions = 0.0, 0
-
-    def act(self, view: View) -> Cluster:
-        """What the policy chooses; its processor time counts, other programs' does not."""
-        started = time.process_time()
-        cluster = self.policy.act(view)
-        self.seconds += time.process_time() - started
-        self.decisions += len(view.row)
-        return cluster
-
-
-@dataclass
-class Comparison:
-    """The planner against fixed clusters on common random episodes, and what a decision costs."""
-
-    scenario: str = "PreDC-v0"
-    """Scenario id."""
-    lam: float | None = None
-    """Trade-off between error and energy [m/mJ]; left out: the scenario's."""
-    episodes: int = 200
-    """Episodes for each policy."""
-    seed: int = 0
-    """Which episodes, as of `wsn evaluate`."""
-    against: list[str] = field(
-        default_factory=lambda: [f"{stem}{n}" for stem in ("nearest", "informed") for n in range(9)]
-    )
-    """Policies by name."""
-    horizon: int = Planner.horizon
-    """Periods that the planner looks ahead."""
-    worlds: int = Planner.worlds
-    """Worlds that it imagines for each choice."""
-
-
-def main(arguments: list[str] | None = None) -> None:
-    """Compare and print."""
-    import tyro
-
-    from wsn_env.reports.tables import print_tables
-
-    settings = tyro.cli(Comparison, args=arguments)
-    scenario = Scenario.named(settings.scenario, **({} if settings.lam is None else {"lam": settings.lam}))
-    planner = Planner(scenario, settings.horizon, settings.worlds)
-    planner.act(View.of(World(scenario).reset([0])))  # compiles and rehearses
-    policies = {"planner": planner} | {name: make_policy(name, scenario) for name in settings.against}
-    timed = {name: Timed(policy) for name, policy in policies.items()}
-    with progress_bar() as report:
-        found = evaluate(timed, scenario, None, settings.episodes, settings.seed, progress=report, threads=1)
-    print_tables(found)
-    for lam in found.lams:
-        rival = max(settings.against, key=lambda name: found.values(name, lam, "return").mean())
-        gain, share = found.difference("planner", rival, lam), -100 / found.values(rival, lam, "return").mean()
-        print(
-            f"planner - {rival}: {gain.mean:+.2f} [{gain.low:+.2f}, {gain.high:+.2f}] m,"
-            f" {share * gain.mean:+.1f} % [{share * gain.low:+.1f}, {share * gain.high:+.1f}]"
-        )
-    for name in ("planner", rival):
-        print(f"{name}: {1e3 * timed[name].seconds / timed[name].decisions:.3g} ms a decision on one core")
-
-
-if __name__ == "__main__":
-    main()

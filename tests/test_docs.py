@@ -23,10 +23,8 @@ def test_links_lead_somewhere(page):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_files_and_names_are_there(page, request):
+def test_files_and_names_are_there(page):
     """`wsn_env/cli.py`, `wsn_env.evaluate`, `python -m studies.seeds`."""
-    if page.name == "tutorials.md":
-        request.applymarker(pytest.mark.xfail(reason="how to add a sensor is to be rewritten", strict=True))
     text = page.read_text()
     files = re.findall(rf"`((?:{FOLDERS})/[\w./]*)`", text)
     assert not [file for file in files if not (ROOT / file).exists()]

@@ -13,14 +13,8 @@ PACKAGES = (  # of wsn_env, from the bottom up
 ON_TOP = ("train", "benchmarks", "studies", "examples")  # beside wsn_env, in the same order
 FROM_ENVS_UP = {"gymnasium", "stable_baselines3", "torch"}
 TOP_LEVEL_ENTRIES = 15
-UPWARD = {  # packages that still import from above; one that is mended fails until its line is gone
-    "models": "physics takes a whole Scenario",
-    "filters": "beliefs and reports stand in simulation.state",
-    "learning": "tuning tunes agents",
-    "agents": "planner prints a comparison",
-    "bluetooth": "the reports of a calibration draw and print",
-}
-LOGIC = {"filters": "make_tracker", "papers": "reproduce"}  # packages whose __init__ still holds some
+UPWARD: dict[str, str] = {}  # packages that still import from above
+LOGIC: dict[str, str] = {}  # packages whose __init__ still holds some
 
 ROOT = Path(__file__).parents[1]
 LAYERS = {name: height for height, name in enumerate((*PACKAGES, *ON_TOP))}

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
+from studies.planning import main
 from tests.test_policies import SCENARIO, chosen, walked
 from tests.worlds import assert_same, sensors_of
 from wsn_env import Scenario, View, World, evaluate
 from wsn_env.agents.imagined import GaussianTracker, draw_worlds, imagined_world, place_nodes, rows_of
 from wsn_env.agents.nearest import ORDERS, Nearest
-from wsn_env.agents.planner import Planner, main
+from wsn_env.agents.planner import Planner
 from wsn_env.compiled import draws
 from wsn_env.envs.merit import gain
 from wsn_env.models.quantity import ScenarioError

@@ -1,47 +1,5 @@
-"""Tracking under water by the strongest signal (patent CN103152791), its claims beside ours.
+"""Tracking under water by the strongest signal (patent CN103152791), its claims beside ours."""
 
-The node with the strongest signal is head, every node within one hop of it is a member, a member reports only above a
-threshold, the head hands mean and covariance to the next one, and the particle filter sets further copies of a particle
-about it instead of on it. The patent gives no figures; what is expected here is an independent implementation's.
+from wsn_env.papers.underwater.rebuild import reproduce
 
-Our reading, in two dimensions (depth comes from a pressure gauge): Underwater-v0's field of 1 km x 1 km, 64 nodes, one
-hop of 250 m, periods of 5 s, levels with 3 dB of noise, a threshold of 85 dB. The target cruises from about 2 m/s, with
-white acceleration of density 1e-5 m^2/s^3 (smooth, 60 periods), 1e-3 (60) or 3e-2 (rough, 30), and the filter knows
-which. It resamples in every period; nobody searches for a lost target; the start is known with sd 20 m and 1 m/s.
-A density D is a process noise of sd sqrt(D / T) in periods of T, up to an independent D T^3 / 12 in the variance of a
-position: 0.3 m^2 at most.
-
-**Head.** The node that *reported* the strongest signal in the last period leads in the next one; the patent's nodes
-compare the signal of the same period. The target moves 10 m between the two.
-**Silence.** A node reports when its level exceeds the threshold, the head like every other, so that a silent one tells
-that its level was below: silence told or silence ignored.
-**Handover.** "carried": the new head goes on with the particles, whatever it took to hand them over; "redrawn": it
-draws them anew from mean and covariance, as the patent has it. Energy is that of mean and covariance for both.
-**Lost.** A run is lost when its mean error over the last ten periods exceeds 100 m.
-**Energy.** An invitation goes to every new member, to all when the head changes; a word to resample to all, each
-period. Sleeping costs are with sensing.
-"""
-
-from __future__ import annotations
-
-from pathlib import Path
-
-from wsn_env.evaluation.progress import Progress, progress_bar
-from wsn_env.papers.claim import write_and_print_claims
-from wsn_env.papers.sheet import prepare_folder, print_sheet
-from wsn_env.papers.underwater import figures
-from wsn_env.papers.underwater.claims import claims, expected
-from wsn_env.papers.underwater.systems import play_system
-
-
-def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
-    """Play the experiments, write every file to `out` and print tables, claims and expected figures."""
-    prepare_folder(out)
-    with progress_bar(progress) as show:
-        results = play_system(runs, show)
-    judged, expectations = claims(results), expected(results)
-    figures.write(out, results)
-    print_sheet("Resampling", figures.resampling(results))
-    print_sheet("Thresholds", figures.thresholds(results))
-    print_sheet("Hysteresis of the head", figures.hysteresis(results))
-    write_and_print_claims(out, judged, expectations)
+__all__ = ["reproduce"]
