@@ -14,6 +14,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from wsn_env.compiled.arrays import Arrays, array, opener, part, record
+from wsn_env.compiled.kernels import inline_piece
 from wsn_env.models.measurement.beacon_levels import RECEIVER
 
 BELIEF = record(
@@ -156,6 +157,12 @@ class Sensors(NamedTuple):
 
     positions: np.ndarray  # (S, 2) m
     receivers: np.ndarray  # (S,) RECEIVER; else (0,)
+
+
+@inline_piece
+def sensors_of(known, b):
+    """The nodes of row b of what the network knows (Knowledge)."""
+    return Sensors(known.network.positions[b], known.receivers[b])
 
 
 KEEP_HEAD, KEEP_CLUSTER, NOBODY = -1, -2, -3
