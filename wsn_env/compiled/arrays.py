@@ -128,6 +128,15 @@ def _leaf_types(cls: type[Arrays]) -> list[tuple[np.dtype, int]]:
     return found
 
 
+def _layout(cls: type[Arrays]) -> list:
+    """Every field with what it holds: kernels read them by their places."""
+    found: list = []
+    for item in fields(cls):
+        about = item.metadata
+        found.append((item.name, _layout(about["part"]) if "part" in about else (about["dtype"], len(about["axes"]))))
+    return found
+
+
 def _words(cls: type[Arrays]) -> int:
     """How long a handle is."""
     return sum(1 + dimensions for _, dimensions in _leaf_types(cls))
@@ -231,5 +240,5 @@ def opener(cls: type[Arrays]):
         return lambda handle: address_of(handle)
 
     record_at.__qualname__ = f"{cls.__name__}_at"
-    record_at.__kernel_layout__ = repr(_leaf_types(cls))
+    record_at.__kernel_layout__ = repr(_layout(cls))  # type: ignore[attr-defined]  # counts in stamps
     return record_at
