@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import textwrap
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -96,6 +97,14 @@ def test_a_damaged_file_is_compiled_anew_and_said(folder, ending, damage):
     words, said = run(folder)
     assert words == ["6.0", "7.0", "first"]
     assert "the kept kernel work.first" in said.replace("__main__", "work") and "is damaged" in said
+    assert run(folder) == (["6.0", "7.0"], "")
+
+
+def test_processes_that_compile_at_once_do_not_damage_each_other(folder):
+    with ThreadPoolExecutor(3) as pool:
+        both = list(pool.map(lambda _: run(folder), range(3)))
+    assert all(words[:2] == ["6.0", "7.0"] and "damaged" not in said for words, said in both)
+    assert sum(len(words) - 2 for words, _ in both) == 2  # each kernel once: who comes later waits and loads it
     assert run(folder) == (["6.0", "7.0"], "")
 
 

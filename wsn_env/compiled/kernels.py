@@ -37,6 +37,7 @@ FAST_MODULES = (  # the filter; the world stays strict
 def _options(**wanted) -> dict:
     """Options of njit; without those that this Numba does not know."""
     # fastmath=False is said aloud: a piece that says nothing takes over what its first caller has.
+    wanted["no_cfunc_wrapper"] = True  # for C's callbacks; a tenth of the time of compiling
     known = {name: value for name, value in wanted.items() if hasattr(DefaultOptions, name)}
     return {"nopython": True, "error_model": "numpy", "nogil": True, "fastmath": False} | known
 
@@ -64,21 +65,41 @@ def lean_piece(function):
 
 
 class Kernel:
-    """A compiled function for Python to call, kept on disk; it is made when it is first called."""
+    """A compiled function for Python to call, kept on disk; it is made when it is first called.
+
+    One that takes a scenario's constants (an argument `cs`) is made for each type of them, that is for each combination
+    of kinds, and each has a place of its own on disk: two processes never write to one place about different kinds.
+    """
 
     def __init__(self, function: FunctionType, options: dict):
         functools.update_wrapper(self, function)
         self.py_func, self.targetoptions = function, options
-        self.call = self._first  # then Numba's own, without a detour through Python
+        names = function.__code__.co_varnames[: function.__code__.co_argcount]
+        self._place = names.index("cs") if "cs" in names else -1
+        self._made: dict[int, tuple] = {}  # by the type's identity: the compiled function, and the type
+        self.call = self._by_kind if self._place >= 0 else self._first
 
     def __call__(self, *arguments):
         return self.call(*arguments)
+
+    def _by_kind(self, *arguments):
+        made = self._made.get(id(arguments[self._place].dtype))
+        return made[0](*arguments) if made else self._first(*arguments)
 
     def _first(self, *arguments):
         if numba.config.DISABLE_JIT:
             self.call = np.errstate(over="ignore")(self.py_func)  # random bits wrap around
             return self.call(*arguments)
-        self.call, result = store.open_kernel(self.py_func, self.targetoptions, arguments)
+        if self._place < 0:
+            self.call, result = store.open_kernel(self.py_func, self.targetoptions, arguments)
+            return result
+        kinds = arguments[self._place].dtype
+        known = next((made for made, other in self._made.values() if other == kinds), None)
+        if known is not None:  # another object of a type that is known
+            self._made[id(kinds)] = known, kinds
+            return known(*arguments)
+        made, result = store.open_kernel(self.py_func, self.targetoptions, arguments, kinds)
+        self._made[id(kinds)] = made, kinds
         return result
 
     def __reduce__(self):

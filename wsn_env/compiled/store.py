@@ -18,17 +18,20 @@ import os
 import shutil
 import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from types import FunctionType
 
 import numba
+import numpy as np
 from numba.core import event
 from numba.core.errors import NumbaError
 
 from wsn_env.compiled.stamp import options_text, stamp
 
-KEPT = 12  # folders of one kernel: of other versions that may come back
+KEPT = 60  # folders of one kernel: of other kinds, and of other versions that may come back
 SUMS = "sums.txt"
 THE_SAME_TIME = 1_000_000_000  # s: Numba compares when a source file was changed
 
@@ -52,11 +55,16 @@ def store_folder() -> Path:
     return home / "wsn_env" / "kernels"
 
 
-def open_kernel(function: FunctionType, options: dict, arguments: tuple):
-    """The compiled function, from the store if it is there, and what it returns for these arguments."""
+def open_kernel(function: FunctionType, options: dict, arguments: tuple, kinds: np.dtype | None = None):
+    """The compiled function, from the store if it is there, and what it returns for these arguments.
+
+    Args:
+        kinds: the type of the constants that it is made for, where it takes any.
+    """
     with _lock:
         name = f"{function.__module__}.{function.__qualname__}"
-        folder = store_folder() / f"{name}-{stamp(function, more=options_text(options))}"
+        more = options_text(options) + ("" if kinds is None else repr(kinds))
+        folder = store_folder() / f"{name}-{stamp(function, more=more)}"
         try:
             source = _prepare(folder, function)
         except OSError as problem:
@@ -64,23 +72,37 @@ def open_kernel(function: FunctionType, options: dict, arguments: tuple):
             dispatcher = numba.jit(**options)(function)
             _opened[dispatcher] = name
             return dispatcher, dispatcher(*arguments)
-        _throw_away_damaged(folder)
-        dispatcher = _dispatcher(function, options, source)
-        _opened[dispatcher] = name
-        try:
-            result = _without_collecting(dispatcher, arguments)
-        except NumbaError:  # the function's own mistake
-            raise
-        except Exception as problem:  # what unpickling a damaged index raises can be anything
-            if not _files(folder):
-                raise
-            _throw_away(folder, repr(problem))
+        with _alone_in(folder):
+            _throw_away_damaged(folder)
             dispatcher = _dispatcher(function, options, source)
             _opened[dispatcher] = name
-            result = _without_collecting(dispatcher, arguments)
-        _folders.append(folder)
-        _sign(folder)
+            try:
+                result = _without_collecting(dispatcher, arguments)
+            except NumbaError:  # the function's own mistake
+                raise
+            except Exception as problem:  # what unpickling a damaged index raises can be anything
+                if not _files(folder):
+                    raise
+                _throw_away(folder, repr(problem))
+                dispatcher = _dispatcher(function, options, source)
+                _opened[dispatcher] = name
+                result = _without_collecting(dispatcher, arguments)
+            _folders.append(folder)
+            _sign(folder)
         return dispatcher, result
+
+
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """No other process opens this kernel meanwhile: it would compile the same, and write over what is signed here."""
+    try:
+        import fcntl
+    except ImportError:  # not on Windows: both compile
+        yield
+        return
+    with open(folder / "lock", "w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
 
 
 def _without_collecting(dispatcher, arguments: tuple):

@@ -113,12 +113,12 @@ class Tracks:
 
 
 @kernel
-def _draw_tracks(start, stop, motions, period_s, side_m, depth_m, recorded, rows, keys, tracks):
+def _draw_tracks(start, stop, cs, period_s, side_m, depth_m, recorded, rows, keys, tracks):
     course = Course(period_s, side_m, depth_m, recorded)
     for b in range(start, stop):
         if rows[b]:
             track = tracks[b]
-            draw(motions[0], draws.stream(keys[b], 0, draws.TRACK), course, track)
+            draw(cs[0], draws.stream(keys[b], 0, draws.TRACK), course, track)
             for state in track:
                 reflect(state, 0, side_m)
                 reflect(state, 2, depth_m)
