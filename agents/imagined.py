@@ -5,6 +5,8 @@ Nothing of the truth enters: not the track, and not the key that the real detect
 
 from __future__ import annotations
 
+from typing import Any
+
 from numba import uint64
 
 from wsn_env.compiled import draws
@@ -26,7 +28,7 @@ def imagined_world(scenario: Scenario, periods: int, particles: int) -> World:
     Args:
         particles: of a particle filter; 0: a `GaussianTracker`, which cannot read binary sensors.
     """
-    changes = dict(periods=periods, motion="straight", filter_q=scenario.filter_q)
+    changes: dict[str, Any] = dict(periods=periods, motion="straight", filter_q=scenario.filter_q)
     changes |= dict(tracker="particle", particles=max(particles, 2), gate_m=None)
     if scenario.radio.handover == "particles":  # as many as there really are
         changes |= dict(handover="estimate", handover_bits=scenario.handover_bits)

@@ -6,6 +6,7 @@ from numba.extending import overload
 from wsn_env.compiled.kernels import kernel, lean_piece
 from wsn_env.models.field import squared_distance
 from wsn_env.models.measurement.base import (
+    Order,
     chance,
     equal_everywhere,
     informs,
@@ -17,7 +18,7 @@ from wsn_env.models.radio.base import reception, transmission
 from wsn_env.models.state import Sensors, knowledge_at
 from wsn_env.simulation.messages import outside
 
-ORDERS = ("nearest", "information", "value")
+ORDERS: tuple[Order, ...] = ("nearest", "information", "value")
 NEAREST, INFORMATION, VALUE = range(len(ORDERS))
 KEEP, BEST, AHEAD = range(3)  # who leads
 LEAD = 0.3  # sensing radii

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -107,7 +108,8 @@ class Training:
             nodes_heard = np.flatnonzero(sample.audible[v])
             row[:] = self.map.distances(nodes_heard, sample.strengths[v, nodes_heard])
         self._cell_m2, self._noise, self._seed = line[1] ** 2 / 12, model.noise, seed
-        self._unit = scenario.measurement.fingerprint_unit
+        measurement: Any = scenario.measurement  # one that has the unit: scenario.tracking.reads
+        self._unit = measurement.fingerprint_unit
 
     def error(self, width: float) -> float:
         """Root mean square error of the fixes at the validation points [m]."""
@@ -167,7 +169,7 @@ _training = lru_cache(maxsize=8)(Training)
 def _relevant(scenario: Scenario) -> Scenario:
     """The scenario without what a map does not hang on, so that like ones share theirs."""
     tracking = Tracking(training_seed=scenario.tracking.training_seed)
-    own = dict(field=scenario.field, measurement=scenario.measurement, detection=scenario.detection)
+    own: dict[str, Any] = dict(field=scenario.field, measurement=scenario.measurement, detection=scenario.detection)
     return Scenario(name="fingerprints", period_s=3600.0, tracking=tracking, **own)
 
 

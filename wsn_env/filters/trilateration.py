@@ -1,5 +1,7 @@
 """Where a target is, from one period's strengths alone: linear and nonlinear least squares."""
 
+from typing import Any
+
 import numpy as np
 
 from wsn_env.compiled.kernels import kernel
@@ -22,7 +24,7 @@ class TrilaterationTracker(MemorylessTracker):
 
     def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
         super().__init__(scenario)
-        self._measurement = scenario.measurement
+        self._measurement: Any = scenario.measurement  # one with squared_ranges: scenario.tracking.reads
         self._constants, self._side_m = constants(scenario), scenario.field.side_m
 
     def locate(self, nodes, places, values):

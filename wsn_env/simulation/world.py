@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from wsn_env.compiled import kernels
@@ -82,7 +84,8 @@ class World:
             self._search(rows, state, outcome)
         self._in_rows(rows, period.settle, outcome.row, state.handle)
         if self.scenario.measurement.lasting_errors:
-            maps, belief = self.tracker.maps, state.belief
+            tracker: Any = self.tracker  # the particle filter: no other reads errors that last
+            maps, belief = tracker.maps, state.belief
             self._in_rows(rows, period.foretell_rows, maps, belief.handle, state.network.positions)
         return state, outcome
 

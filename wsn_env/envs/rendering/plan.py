@@ -86,7 +86,8 @@ def _heard(scenario: Scenario) -> str:
 
 def _flowed(entries, font, width) -> list[list[tuple[int, str, str]]]:
     """Entries of a legend by lines, with the x of each."""
-    lines, x = [[]], font // 2
+    lines: list[list[tuple[int, str, str]]] = [[]]
+    x = font // 2
     for symbol, words in entries:
         wide = round(1.5 * font) + text_width(words, font)
         if x + wide > width:

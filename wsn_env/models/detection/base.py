@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import F, log
 from wsn_env.models.kinds import Kind, by_kind
+
+if TYPE_CHECKING:
+    from wsn_env.models.measurement.base import Measurement
+    from wsn_env.scenario import Scenario
 
 LEAST, MOST = 1e-6, 1.0 - 1e-6  # probabilities as a filter takes them: no report rules a particle out
 POINT = 1.7320508075688772  # sds: Gauss and Hermite's three points
@@ -39,15 +43,15 @@ class DetectionRule(Kind):
 
     values_decide: ClassVar[bool] = False  # whether the measured value decides, so that detecting tells of the value
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """Raise ScenarioError where it does not fit the rest of the scenario."""
 
-    def constants(self, scenario) -> dict[str, float]:
+    def constants(self, scenario: Scenario) -> dict[str, float]:
         """The settings, and the distances."""
         radius_m, reach_m = self.distances_m(scenario.measurement)
         return super().constants(scenario) | {"radius_m": radius_m, "reach_m": reach_m}
 
-    def distances_m(self, measurement) -> tuple[float, float]:
+    def distances_m(self, measurement: Measurement) -> tuple[float, float]:
         """The sensing radius, and the reach, from where on nothing is detected [m]."""
         raise NotImplementedError
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from statistics import NormalDist
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -14,6 +14,10 @@ from wsn_env.compiled.elementary import F, exp, exp32, expm1_32, log, log32, nor
 from wsn_env.compiled.kernels import inline_piece, lean_piece
 from wsn_env.models.detection.base import DetectionRule, probability
 from wsn_env.models.quantity import quantity
+
+if TYPE_CHECKING:
+    from wsn_env.models.measurement.base import Measurement
+    from wsn_env.scenario import Scenario
 
 SHARPEST = 1e-6  # m^(2/3): an edge without width would divide by it
 LOG_LEAST, LOG_MOST = F(-13.815510558), F(-1.0000005e-6)  # p in [1e-6, 1 - 1e-6]: no report rules a particle out
@@ -79,11 +83,11 @@ class Detection(DetectionRule):
             near, far = (middle, far) if a1**self.decay_power < wanted * a2**self.edge_power else (near, middle)
         return far
 
-    def distances_m(self, measurement) -> tuple[float, float]:
+    def distances_m(self, measurement: Measurement) -> tuple[float, float]:
         """Sensing radius and reach, whatever is measured."""
         return self.radius_m, self.reach_m
 
-    def constants(self, scenario) -> dict[str, float]:
+    def constants(self, scenario: Scenario) -> dict[str, float]:
         """The settings; and the edge as a normal distribution in the cube root of the squared distance."""
         near, far = (self.distance_m(NormalDist().cdf(sds)) ** (2 / 3) for sds in (1, -1))
         edge = {"edge_root": (near + far) / 2, "edge_width": max((far - near) / 2, SHARPEST)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -14,6 +14,10 @@ from wsn_env.models.detection.radius import cube_root
 from wsn_env.models.measurement.base import level, level_slope, sample
 from wsn_env.models.measurement.level import FARTHEST_M
 from wsn_env.models.quantity import ScenarioError, quantity
+
+if TYPE_CHECKING:
+    from wsn_env.models.measurement.base import Measurement
+    from wsn_env.scenario import Scenario
 
 LEAST_SDS = 4.753424308822899  # Phi(-this) = 1e-6
 
@@ -32,7 +36,7 @@ class Threshold(DetectionRule):
     allocates: ClassVar[bool] = False
     values_decide: ClassVar[bool] = True
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """Raise ScenarioError unless the mean level falls to the threshold somewhere."""
         self._check_levels(scenario.measurement)
 
@@ -49,11 +53,12 @@ class Threshold(DetectionRule):
                 f" at the source, {low:.4g} and {high:.4g} dB"
             )
 
-    def distances_m(self, measurement) -> tuple[float, float]:
+    def distances_m(self, measurement: Measurement) -> tuple[float, float]:
         """Sensing radius, where the mean level is at the threshold, and reach, where p falls to 1e-6 (taken as 0)."""
         self._check_levels(measurement)
-        weakest = self.threshold_db - LEAST_SDS * measurement.noise_db
-        return measurement.distance_m(self.threshold_db), measurement.distance_m(weakest)
+        levels: Any = measurement
+        weakest = self.threshold_db - LEAST_SDS * levels.noise_db
+        return levels.distance_m(self.threshold_db), levels.distance_m(weakest)
 
     @staticmethod
     def probability(d, m, distance):

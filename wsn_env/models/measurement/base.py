@@ -6,7 +6,7 @@ Kernels call the functions at the end of this file with a kind's constants first
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,11 @@ from wsn_env.compiled.kernels import lean_piece
 from wsn_env.models.detection.base import detects, mean_probability, probability, stream_of
 from wsn_env.models.kinds import Kind, by_kind
 from wsn_env.models.quantity import ScenarioError
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
+
+Order = Literal["nearest", "information", "value"]  # of merit
 
 EXPECT_AT = 1.7320508075688772  # sds: Gauss and Hermite's three points
 
@@ -87,7 +92,7 @@ class Measurement(Kind):
     reports_state: ClassVar[bool] = False  # whether nodes remember a state and report how it stands
     lasting_errors: ClassVar[bool] = False  # whether errors are alike from period to period, so that silence tells
     # nothing and a tracker has to learn them
-    order: ClassVar[str] = "information"  # the menu's order of merit that suits it
+    order: ClassVar[Order] = "information"  # the menu's order of merit that suits it
     verb: ClassVar[str] = "reported"  # what a node has done that was heard
 
     def check_functions(self) -> None:
@@ -107,10 +112,10 @@ class Measurement(Kind):
         """Lengths of the state's arrays that only some kinds use."""
         return {"states": nodes if self.reports_state else 0, "receivers": nodes if self.lasting_errors else 0}
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """Raise ScenarioError where it does not fit the rest of the scenario."""
 
-    def packets_of(self, scenario):
+    def packets_of(self, scenario: Scenario):
         """Where an episode's packets come from, drawn or recorded before it begins; None: there are none."""
         return None
 

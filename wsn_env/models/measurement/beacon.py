@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from wsn_env.models.measurement.beacon_levels import foretell_levels, weigh_leve
 from wsn_env.models.measurement.beacon_packets import Packets
 from wsn_env.models.quantity import ScenarioError, quantity
 from wsn_env.models.recordings.replay import load_map
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 MAP_LEAVES = 0.15  # of the static field's variance, where a map was made on other days
 
@@ -134,7 +137,7 @@ class Beacon(Measurement):
     lasting_errors: ClassVar[bool] = True
     verb: ClassVar[str] = "has heard"
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """Levels of all receivers, none of what silence or a search would tell."""
         self.of_nodes(scenario.field.nodes)
         tracking = scenario.tracking
@@ -146,7 +149,7 @@ class Beacon(Measurement):
                 " allowed are False and 'joint' with Beacon levels"
             )
 
-    def packets_of(self, scenario) -> Packets:
+    def packets_of(self, scenario: Scenario) -> Packets:
         """Where an episode's packets come from."""
         return Packets(self, scenario)
 
@@ -166,7 +169,7 @@ class Beacon(Measurement):
             )
         return maps
 
-    def constants(self, scenario) -> dict[str, float]:
+    def constants(self, scenario: Scenario) -> dict[str, float]:
         """What the tracker takes levels for."""
         heard = self.heard(scenario.period_s)
         return dict(

@@ -33,7 +33,7 @@ class Packets:
 
     def __init__(self, beacon, scenario):
         self._beacon = np.zeros(1, BEACON_RECORD)
-        for name in BEACON_RECORD.names:
+        for name in BEACON_RECORD.names or ():
             self._beacon[name] = getattr(beacon, name)
         self._receivers = beacon.of_nodes(scenario.field.nodes)
         self._receivers[:, 1] *= 0.5 * PER_NEPER

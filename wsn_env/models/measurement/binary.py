@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
@@ -11,8 +11,11 @@ from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import F, exp, exp32, log32, normal_cdf
 from wsn_env.compiled.kernels import lean_piece
 from wsn_env.models.detection.base import detects, stream_of
-from wsn_env.models.measurement.base import Line, Measurement, node_at, tells
+from wsn_env.models.measurement.base import Line, Measurement, Order, node_at, tells
 from wsn_env.models.quantity import ScenarioError, quantity
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 TWO_PI = 6.283185307179586
 
@@ -25,7 +28,7 @@ class Binary(Measurement):
     ever sensed, that is 0.
     """
 
-    reports: str = quantity(
+    reports: Literal["changes", "presence"] = quantity(
         "changes",
         "changes: a state that differs from the last one sensed; presence: every 1, in every period",
         choices=("changes", "presence"),
@@ -42,10 +45,10 @@ class Binary(Measurement):
 
     allocates: ClassVar[bool] = False
     reports_state: ClassVar[bool] = True
-    order: ClassVar[str] = "value"
+    order: ClassVar[Order] = "value"
     verb: ClassVar[str] = "detects"
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """A bitmap already tells who keeps silent."""
         if scenario.tracking.silent_information:
             raise ScenarioError(
@@ -57,7 +60,7 @@ class Binary(Measurement):
         """At the edge of detection."""
         return radius_m
 
-    def constants(self, scenario) -> dict[str, float]:
+    def constants(self, scenario: Scenario) -> dict[str, float]:
         """The settings, the disc, and how far the bitmap may be trusted."""
         return dict(
             every_presence=self.reports == "presence",

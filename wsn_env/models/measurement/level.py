@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import F, log, log32
 from wsn_env.models.measurement.base import Line, Measurement, level, level_slope
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 FARTHEST_M = 1e7  # as far as a mean level is followed
 
@@ -22,10 +25,20 @@ class Level(Measurement):
     and Gaussian noise of sd `noise_db`.
     """
 
-    exponent: float
     noise_db: float
     floor_m: float
-    absorption_db_per_m: ClassVar[float] = 0.0
+    if TYPE_CHECKING:  # a kind's are constants, quantities or properties
+
+        @property
+        def exponent(self) -> float:
+            """n."""
+
+        @property
+        def absorption_db_per_m(self) -> float:
+            """Further loss with the distance."""
+    else:
+        exponent: float
+        absorption_db_per_m: ClassVar[float] = 0.0
     abstract: ClassVar[bool] = True
     allocates: ClassVar[bool] = False
 
@@ -39,7 +52,7 @@ class Level(Measurement):
         """What the widths of a fingerprint network are counted in [dB]."""
         return self.noise_db / 3
 
-    def constants(self, scenario) -> dict[str, float]:
+    def constants(self, scenario: Scenario) -> dict[str, float]:
         """h as `at_1m - slope ln(max(d, floor_m)^2) - absorption max(d, floor_m)`."""
         slope = 5 * self.exponent / math.log(10)
         return dict(

@@ -9,7 +9,7 @@ import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import F
-from wsn_env.models.measurement.base import Line, Measurement
+from wsn_env.models.measurement.base import Line, Measurement, Order
 from wsn_env.models.quantity import quantity
 
 
@@ -21,7 +21,7 @@ class Position(Measurement):
 
     allocates: ClassVar[bool] = False
     values: ClassVar[int] = 2
-    order: ClassVar[str] = "nearest"
+    order: ClassVar[Order] = "nearest"
 
     def fixes(self, values: np.ndarray, places: np.ndarray, radius_m: float) -> tuple[np.ndarray, float]:
         """The reports themselves."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from wsn_env.compiled.elementary import F, exp, exp32, log, log32
 from wsn_env.compiled.kernels import lean_piece
 from wsn_env.models.measurement.base import Line, Measurement
 from wsn_env.models.quantity import quantity
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 
 @lean_piece
@@ -37,7 +40,7 @@ class RssiPower(Measurement):
         """A third of the noise stands for the decibel."""
         return self.noise / 3
 
-    def constants(self, scenario) -> dict[str, float]:
+    def constants(self, scenario: Scenario) -> dict[str, float]:
         """The mean as `amplitude exp(-slope ln(max(d, floor_m)^2))`."""
         return dict(amplitude=self.amplitude, slope=self.exponent / 2, noise=self.noise, floor_m=self.floor_m)
 

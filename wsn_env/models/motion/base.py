@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,10 @@ from wsn_env.compiled.elementary import HALF_PI, sincos
 from wsn_env.compiled.kernels import lean_piece, piece
 from wsn_env.models.kinds import Kind, by_kind
 from wsn_env.models.quantity import ScenarioError
+
+if TYPE_CHECKING:
+    from wsn_env.models.measurement.base import Measurement
+    from wsn_env.scenario import Scenario
 
 
 class Course(NamedTuple):
@@ -45,21 +49,21 @@ class Motion(Kind):
         """sd of the track's own white acceleration; None: it has none, and turns as it likes."""
         return None
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """Raise ScenarioError where field or horizon leave it no room; asked when a world is made."""
 
-    def check_measurement(self, measurement) -> None:
+    def check_measurement(self, measurement: Measurement) -> None:
         """Raise ScenarioError where nodes must measure something else; asked when a scenario is made."""
 
     def horizon(self, period_s: float) -> int | None:
         """How many periods it lasts; None: as many as one likes."""
         return None
 
-    def recorded_tracks(self, scenario) -> np.ndarray:
+    def recorded_tracks(self, scenario: Scenario) -> np.ndarray:
         """(N, periods + 1, 4) tracks that are known beforehand."""
         return np.zeros((0, scenario.periods + 1, 4))
 
-    def recorded_packets(self, scenario) -> np.ndarray:
+    def recorded_packets(self, scenario: Scenario) -> np.ndarray:
         """(periods + 1, S, 2) packets that were recorded with the track; (0, 0, 2): none."""
         return np.zeros((0, 0, 2), np.float32)
 

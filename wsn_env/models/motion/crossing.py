@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from wsn_env.compiled import draws
 from wsn_env.models.motion.base import Motion, set_state
 from wsn_env.models.motion.prediction import advance
 from wsn_env.models.quantity import quantity
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 TRIES = 100
 
@@ -32,7 +35,7 @@ class Crossing(Motion):
         """That of the settings."""
         return self.acceleration_ms2
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """The end points must find room."""
         side = scenario.field.side_m
         room = (side - 2 * self.margin_m) * 2**0.5

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from wsn_env.models.motion.recorded import RecordedMotion
 from wsn_env.models.quantity import ScenarioError
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -71,6 +74,6 @@ class Legs(RecordedMotion):
         track[:, 1::2] = legs[leg, 1:]
         return track
 
-    def recorded_tracks(self, scenario) -> np.ndarray:
+    def recorded_tracks(self, scenario: Scenario) -> np.ndarray:
         """The one."""
         return self._track(scenario)[None]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from wsn_env.compiled import draws
 from wsn_env.models.motion.base import Motion
 from wsn_env.models.quantity import ScenarioError, quantity
 from wsn_env.models.recordings.tracks import read_track
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,6 @@ class Recorded(RecordedMotion):
             raise ScenarioError("Recorded.tracks = (): must name at least one CSV file with columns t, x, y")
         super().__post_init__()
 
-    def recorded_tracks(self, scenario) -> np.ndarray:
+    def recorded_tracks(self, scenario: Scenario) -> np.ndarray:
         """One of each file."""
         return np.stack([read_track(path, self.span_m, scenario) for path in self.tracks])

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from wsn_env.compiled.elementary import HALF_PI, sincos
 from wsn_env.models.motion.base import Motion, set_state
 from wsn_env.models.quantity import quantity
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -20,7 +23,7 @@ class Sine(Motion):
     amplitude_m: float = quantity(25.0, "swing along y", at_least=0)
     turn_s: float = quantity(100.0, "time of one wave", above=0)
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """The wave must fit the field and the period."""
         if self.turn_s < scenario.period_s:
             raise self._limit("turn_s", f"at least a period, {scenario.period_s} s")

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import HALF_PI, sincos
 from wsn_env.models.motion.base import Motion, heading_of, reflect
 from wsn_env.models.motion.prediction import advance
 from wsn_env.models.quantity import quantity
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -20,7 +23,7 @@ class Turns(Motion):
     speed_ms: float = quantity(1.0, "speed", above=0)
     turn_probability: float = quantity(0.1, "probability of a turn in a period", at_least=0, at_most=1)
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """At most a side in a period."""
         fastest = scenario.field.side_m / scenario.period_s
         if self.speed_ms > fastest:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.models.motion.base import Motion, set_state
 from wsn_env.models.quantity import ScenarioError, quantity
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,7 @@ class Walk(Motion):
         if self.slowest_ms > self.fastest_ms:
             raise ScenarioError(f"Walk.slowest_ms = {self.slowest_ms}: must be at most fastest_ms = {self.fastest_ms}")
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """The goals must find room, and no leg may leave it in a period."""
         room = min(scenario.field.room_m)
         if self.margin_m >= room / 2:

@@ -17,7 +17,8 @@ def read_track(path: str, span_m: float | None, scenario) -> np.ndarray:
     Raises:
         ScenarioError: names the file, the line and what is allowed.
     """
-    times, points = [], []
+    times: list[float] = []
+    points: list[tuple[float, float]] = []
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
             table = csv.DictReader(file, skipinitialspace=True)
