@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
@@ -71,4 +71,4 @@ def check_switches(switches: Sequence[Switch]) -> None:
 
 
 RULES = {"nearest": "adaptive", "information": "adaptive_informed"}
-adaptive_informed = partial(Adaptive, order="information")
+adaptive_informed: Callable[..., Adaptive] = partial(Adaptive, order="information")

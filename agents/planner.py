@@ -56,7 +56,7 @@ class Planner(ViewPolicy):
     rule: Policy | None = None  # None: the fixed size, see `Nearest`, that rehearsals found best for the row's lam
     order: Order | None = None  # of merit; None: nearest for positions and bits, information for strengths
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.scenario.measurement.lasting_errors:
             kind = type(self.scenario.measurement).__name__
             raise ValueError(f"Scenario.measurement = {kind}: planner cannot draw errors that last; allowed are others")

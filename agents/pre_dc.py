@@ -46,7 +46,7 @@ class PreDC(ViewPolicy):
     def _form(self, view: View, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Heads (B,) and members (B, S) of new clusters."""
         able = view.battery >= self._head_energy_j(p)[:, None]
-        able = np.where(able.any(axis=1)[:, None], able, view.alive)
+        able = np.where(np.any(able, axis=1, keepdims=True), able, view.alive)
         head = np.where(able.any(axis=1), np.where(able, view.distance, np.inf).argmin(axis=1), -1)
 
         # Nearest first is by probability first; the head goes before all.

@@ -72,7 +72,8 @@ class Kernel:
 
     def __init__(self, function: FunctionType, options: dict[str, Any]) -> None:
         functools.update_wrapper(self, function)
-        self.py_func, self.targetoptions = function, options
+        self.py_func: FunctionType = function
+        self.targetoptions: dict[str, Any] = options
         self.call: Callable[..., Any] = self._first  # then Numba's own, without a detour through Python
 
     def __call__(self, *arguments: Any) -> Any:

@@ -21,6 +21,7 @@ import threading
 from functools import cache
 from pathlib import Path
 from types import FunctionType
+from typing import Any
 
 import numba
 from numba.core import event
@@ -52,7 +53,7 @@ def store_folder() -> Path:
     return home / "wsn_env" / "kernels"
 
 
-def open_kernel(function: FunctionType, options: dict, arguments: tuple):
+def open_kernel(function: FunctionType, options: dict, arguments: tuple) -> tuple[Any, ...]:
     """The compiled function, from the store if it is there, and what it returns for these arguments."""
     with _lock:
         name = f"{function.__module__}.{function.__qualname__}"

@@ -46,7 +46,7 @@ class MenuAction:
     def __init__(self, scenario: Scenario, order: Order, candidates: int) -> None:
         if candidates <= MENU_MEMBERS:
             raise ValueError(f"candidates = {candidates}: the menu needs at least {MENU_MEMBERS + 1}")
-        self.space = spaces.Discrete(MENU_ENTRIES)
+        self.space: spaces.Discrete = spaces.Discrete(MENU_ENTRIES)
         self._by, self._candidates, self._ring_m = ORDERS.index(order), candidates, scenario.ring_m
         self._constants = constants(scenario)
 
@@ -111,7 +111,7 @@ class SubsetAction:
     """MultiDiscrete [K + 1] + [2] * K: the head (0: keep it, j: the j-th nearest); which of the K nearest are in."""
 
     def __init__(self, scenario: Scenario, order: Order, candidates: int) -> None:
-        self.space = spaces.MultiDiscrete([candidates + 1] + [2] * candidates)
+        self.space: spaces.MultiDiscrete = spaces.MultiDiscrete([candidates + 1] + [2] * candidates)
         self._candidates, self._ring_m = candidates, scenario.ring_m
 
     def cluster(self, action: Any, view: View) -> Cluster:
@@ -137,7 +137,7 @@ class RadiusAction:
     NEAR = 0.8
 
     def __init__(self, scenario: Scenario, order: Order, candidates: int) -> None:
-        self.space = spaces.Box(0.0, 1.0, (1,), np.float32)
+        self.space: spaces.Box = spaces.Box(0.0, 1.0, (1,), np.float32)
         self._candidates, self._radius_m = candidates, scenario.radius_m
 
     def cluster(self, action: Any, view: View) -> Cluster:
@@ -159,7 +159,7 @@ class ScoresAction:
     """Box(K) in [-1, 1]: of the K nearest candidates those above 0 are members and the highest is the head."""
 
     def __init__(self, scenario: Scenario, order: Order, candidates: int) -> None:
-        self.space = spaces.Box(-1.0, 1.0, (candidates,), np.float32)
+        self.space: spaces.Box = spaces.Box(-1.0, 1.0, (candidates,), np.float32)
         self._candidates, self._ring_m = candidates, scenario.ring_m
 
     def cluster(self, action: Any, view: View) -> Cluster:
@@ -179,7 +179,7 @@ class NodesAction:
     the living node nearest to it, alone."""
 
     def __init__(self, scenario: Scenario, order: Order, candidates: int) -> None:
-        self.space = spaces.MultiDiscrete([2] * scenario.field.nodes)
+        self.space: spaces.MultiDiscrete = spaces.MultiDiscrete([2] * scenario.field.nodes)
 
     def cluster(self, action: Any, view: View) -> Cluster:
         """The cluster of the chosen nodes."""
@@ -199,7 +199,9 @@ class ClusterAction:
 
     def __init__(self, scenario: Scenario, order: Order, candidates: int) -> None:
         nodes = scenario.field.nodes
-        self.space = spaces.Dict({"head": spaces.Discrete(nodes), "members": spaces.MultiDiscrete([2] * nodes)})
+        self.space: spaces.Dict = spaces.Dict(
+            {"head": spaces.Discrete(nodes), "members": spaces.MultiDiscrete([2] * nodes)}
+        )
 
     def cluster(self, action: Any, view: View) -> Cluster:
         """The choice itself."""

@@ -59,15 +59,16 @@ class ClusterEnv(gym.Env):
         fast: bool = False,
         **overrides: Unpack[Quantities],
     ) -> None:
-        self.scenario = Scenario.of(scenario, **overrides)
+        self.scenario: Scenario = Scenario.of(scenario, **overrides)
         self._camera = None if render_mode is None else Camera(self.scenario, render_mode, frame_px)
-        self.interface = Interface(self.scenario, Settings(action, observation, reward, order, candidates))
-        self.world = World(self.scenario, threads=1, fast=fast)
-        self.render_mode = render_mode
-        self.action_space = self.interface.action.space
-        self.observation_space = self.interface.observation.space
+        self.interface: Interface = Interface(self.scenario, Settings(action, observation, reward, order, candidates))
+        self.world: World = World(self.scenario, threads=1, fast=fast)
+        self.render_mode: RenderMode | None = render_mode
+        self.action_space: gym.Space[Any] = self.interface.action.space
+        self.observation_space: gym.Space[Any] = self.interface.observation.space
         if self.interface.reward_space is not None:
-            self.reward_space, self.reward_dim = self.interface.reward_space, 2
+            self.reward_space: gym.spaces.Box = self.interface.reward_space
+            self.reward_dim: int = 2
         self._state: State = None  # type: ignore[assignment]  # until the first reset
         self._view: View = None  # type: ignore[assignment]
         self._lam, self._period = 0.0, 0

@@ -3,9 +3,11 @@
 from dataclasses import dataclass
 from typing import Any
 
-from wsn_env.envs.actions import ActionName, make_action
+from gymnasium.spaces import Box
+
+from wsn_env.envs.actions import Action, ActionName, make_action
 from wsn_env.envs.info import measures
-from wsn_env.envs.observations import ObservationName, make_observation
+from wsn_env.envs.observations import Observation, ObservationName, make_observation
 from wsn_env.envs.rewards import RewardName, make_reward, reward_space
 from wsn_env.models.measurement.base import Order
 from wsn_env.scenario import Scenario
@@ -26,11 +28,11 @@ class Interface:
     """The three translations of an environment, bound to a scenario."""
 
     def __init__(self, scenario: Scenario, settings: Settings, threads: int = 1) -> None:
-        self.action = make_action(settings.action, scenario, settings.order, settings.candidates)
-        self.observation = make_observation(
+        self.action: Action = make_action(settings.action, scenario, settings.order, settings.candidates)
+        self.observation: Observation = make_observation(
             settings.observation, scenario, settings.order, settings.candidates, threads
         )
-        self.reward_space = reward_space(settings.reward)
+        self.reward_space: Box | None = reward_space(settings.reward)
         self._reward = make_reward(settings.reward)
 
     def judge(self, outcome: Any, lam: Any) -> tuple[Any, dict[str, Any]]:

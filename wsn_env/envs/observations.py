@@ -129,8 +129,8 @@ class CandidatesObservation:
     features: tuple[str, ...] = CANDIDATE_FEATURES
 
     def __init__(self, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> None:
-        self.shape = (candidates, len(self.features))
-        self.space = spaces.Box(-BOUND, BOUND, (G + candidates * self.shape[1],), np.float32)
+        self.shape: tuple[int, int] = (candidates, len(self.features))
+        self.space: spaces.Box = spaces.Box(-BOUND, BOUND, (G + candidates * self.shape[1],), np.float32)
         self._candidates, self._ring_m, self._threads = candidates, scenario.ring_m, threads
         self._scenario, self._constants = scenario, constants(scenario)
 
@@ -170,12 +170,12 @@ class CandidatesObservation:
 class MenuObservation(CandidatesObservation):
     """Flat Box float32: BELIEF_FEATURES, then ENTRY_FEATURES of each entry of the menu: what it promises."""
 
-    features = ENTRY_FEATURES
+    features: tuple[str, ...] = ENTRY_FEATURES
 
     def __init__(self, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> None:
         super().__init__(scenario, order, candidates, threads)
-        self.shape = (MENU_ENTRIES, len(self.features))
-        self.space = spaces.Box(-BOUND, BOUND, (G + MENU_ENTRIES * self.shape[1],), np.float32)
+        self.shape: tuple[int, int] = (MENU_ENTRIES, len(self.features))
+        self.space: spaces.Box = spaces.Box(-BOUND, BOUND, (G + MENU_ENTRIES * self.shape[1],), np.float32)
         self._order = order
 
     def _fill(self, view: View, rows, out, scratch) -> np.ndarray:
@@ -220,7 +220,7 @@ class ViewObservation:
         def box(low, high, *shape):
             return spaces.Box(low, high, shape, np.float64)
 
-        self.space = spaces.Dict(
+        self.space: spaces.Dict = spaces.Dict(
             {
                 "period": spaces.Discrete(scenario.periods + 1),
                 "lam": box(0.0, max(scenario.lam_range[1], 1.0), 1),

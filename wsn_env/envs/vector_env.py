@@ -60,21 +60,22 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
     ) -> None:
         if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
             raise ValueError(f"num_envs = {num_envs!r}: must be a whole number, at least 1")
-        self.num_envs = int(num_envs)
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.num_envs: int = int(num_envs)
+        self.autoreset_mode: AutoresetMode = AutoresetMode(autoreset_mode)
         self.metadata = type(self).metadata | {"autoreset_mode": self.autoreset_mode}
-        self.render_mode = render_mode
-        self.scenario = Scenario.of(scenario, **overrides)
+        self.render_mode: RenderMode | None = render_mode
+        self.scenario: Scenario = Scenario.of(scenario, **overrides)
         self._camera = None if render_mode is None else Camera(self.scenario, render_mode, frame_px)
-        self.world = World(self.scenario, threads, fast)
+        self.world: World = World(self.scenario, threads, fast)
         settings = Settings(action, observation, reward, order, candidates)
-        self.interface = Interface(self.scenario, settings, self.world.threads)
-        self.single_action_space = self.interface.action.space
-        self.single_observation_space = self.interface.observation.space
-        self.action_space = batch_space(self.single_action_space, num_envs)
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.interface: Interface = Interface(self.scenario, settings, self.world.threads)
+        self.single_action_space: gym.Space[Any] = self.interface.action.space
+        self.single_observation_space: gym.Space[Any] = self.interface.observation.space
+        self.action_space: gym.Space[Any] = batch_space(self.single_action_space, num_envs)
+        self.observation_space: gym.Space[Any] = batch_space(self.single_observation_space, num_envs)
         if self.interface.reward_space is not None:
-            self.reward_space, self.reward_dim = self.interface.reward_space, 2
+            self.reward_space: gym.spaces.Box = self.interface.reward_space
+            self.reward_dim: int = 2
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._state: State = None  # type: ignore[assignment]  # until the first reset
         self._view: View = None  # type: ignore[assignment]

@@ -22,7 +22,7 @@ class KeptBlocks:
     A policy is known by its repr, which for a dataclass shows its parameters, and by the file of its class.
     """
 
-    def __init__(self, folder: str | Path | None, settings: dict, policies: Sequence[Policy]):
+    def __init__(self, folder: str | Path | None, settings: dict, policies: Sequence[Policy]) -> None:
         self._blocks: dict[tuple, list[dict]] = {}
         self._path = None if folder is None else Path(folder) / BLOCKS_FILE
         if self._path is None:

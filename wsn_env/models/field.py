@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isqrt
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -75,7 +75,7 @@ class Field(Section):
 
 
 @piece
-def scatter(stream, side_m, positions):
+def scatter(stream: Any, side_m: float, positions: np.ndarray) -> None:
     """Draw the positions (S, 2) uniformly in the square [m]."""
     for i in range(len(positions)):
         positions[i, 0] = side_m * draws.uniform(stream, 2 * i)
@@ -83,7 +83,7 @@ def scatter(stream, side_m, positions):
 
 
 @piece
-def lay_out(stream, side_m, jitter, positions):
+def lay_out(stream: Any, side_m: float, jitter: float, positions: np.ndarray) -> None:
     """Draw the positions (S, 2), S a square number: each within `jitter` cells of the middle of its own cell [m]."""
     across = int(np.round(np.sqrt(len(positions))))
     cell = side_m / across
@@ -113,7 +113,7 @@ def _place_by_key(key, side_m, in_grid, jitter, positions):
 
 
 @lean_piece
-def squared_distance(positions, i, x, y):
+def squared_distance(positions: np.ndarray, i: int, x: float, y: float) -> float:
     """Squared distance of node i to (x, y) [m^2]."""
     dx = positions[i, 0] - x
     dy = positions[i, 1] - y

@@ -154,7 +154,8 @@ class Registry:
     """The kinds of a role by name: that of the file in the role's package that the class stands in."""
 
     def __init__(self, role: type[Kind], package: str) -> None:
-        self.role, self._package = role, package
+        self.role: type[Kind] = role
+        self._package = package
 
     @property
     def kinds(self) -> dict[str, type[Kind]]:

@@ -42,7 +42,8 @@ class Camera:
             raise ValueError(f"render_mode = {render_mode!r}: allowed are None, {', '.join(RENDER_MODES)}")
         if isinstance(frame_px, bool) or not isinstance(frame_px, (int, np.integer)) or frame_px < SMALLEST:
             raise ValueError(f"frame_px = {frame_px!r}: must be a whole number of pixels, at least {SMALLEST}")
-        self.scenario, self.frame_px = scenario, int(frame_px)
+        self.scenario: Scenario = scenario
+        self.frame_px: int = int(frame_px)
         self._trail: Trail = None  # type: ignore[assignment]  # until episodes have begun
         self._window = Window(f"wsn_env {scenario.name}", fps) if render_mode == "human" else None
 
@@ -96,7 +97,8 @@ class Window:
             raise gym.error.DependencyNotInstalled(
                 "render_mode = 'human' needs pygame: pip install pygame-ce (or 'wsn_env[render]')"
             )
-        self.title, self.fps = title, fps
+        self.title: str = title
+        self.fps: int = fps
         self._screen: Any = None
         self._clock: Any = None
         self._closed = False

@@ -61,13 +61,13 @@ class Threshold(DetectionRule):
         return levels.distance_m(self.threshold_db), levels.distance_m(weakest)
 
     @staticmethod
-    def probability(d, m, distance):
+    def probability(d: Any, m: Any, distance: float) -> float:
         if distance >= d.reach_m:
             return 0.0
         return normal_cdf((level(m, distance * distance) - d.threshold_db) / m.noise)
 
     @staticmethod
-    def mean_probability(d, m, dx, dy, xx, xy, yy):
+    def mean_probability(d: Any, m: Any, dx: float, dy: float, xx: float, xy: float, yy: float) -> float:
         """The mean level is taken for a straight line over the cube root of the squared distance, which is nearly
         normal; so the mean has a closed form."""
         root, mean, variance = cube_root(dx, dy, xx, xy, yy)
@@ -77,19 +77,19 @@ class Threshold(DetectionRule):
         return normal_cdf(sds / np.sqrt(1.0 + steepness * steepness * root * root * variance))
 
     @staticmethod
-    def stream_of(d, key, period):
+    def stream_of(d: Any, key: Any, period: int) -> Any:
         return draws.stream(key, period, draws.MEASUREMENT)  # what decides is the measurement itself
 
     @staticmethod
-    def detects(d, m, stream, number, node, x, y):
+    def detects(d: Any, m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> bool:
         return sample(m, stream, number, node, x, y)[0] > d.threshold_db
 
     @staticmethod
-    def weigh_detection(d, m, x, log_weights, node):
+    def weigh_detection(d: Any, m: Any, x: np.ndarray, log_weights: np.ndarray, node: Any) -> None:
         """A report's value tells all; that it came adds nothing."""
 
     @staticmethod
-    def weigh_silence(d, m, x, log_weights, node, delivery):
+    def weigh_silence(d: Any, m: Any, x: np.ndarray, log_weights: np.ndarray, node: Any, delivery: float) -> None:
         """Add the log probability that nothing was heard of the awake node.
 
         ln Phi((threshold - h(d)) / sigma)               delivery = 1: the level was below the threshold

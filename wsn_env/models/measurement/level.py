@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -83,24 +83,24 @@ class Level(Measurement):
         return signal + by_db
 
     @staticmethod
-    def level(m, squared):
+    def level(m: Any, squared: float) -> float:
         near = max(squared, m.floor_m * m.floor_m, 1e-12)
         return m.at_1m - m.slope * log(near)
 
     @staticmethod
-    def level_slope(m, squared):
+    def level_slope(m: Any, squared: float) -> float:
         if squared < max(m.floor_m * m.floor_m, 1e-12):
             return 0.0
         return -2.0 * m.slope / squared
 
     @staticmethod
-    def sample(m, stream, number, node, x, y):
+    def sample(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> tuple[float, float]:
         noise, _ = draws.normal_pair(stream, number)
         dx, dy = node.x - x, node.y - y
         return level(m, dx * dx + dy * dy) + m.noise * noise, 0.0
 
     @staticmethod
-    def linearise(m, node, x, y, xx, xy, yy):
+    def linearise(m: Any, node: Any, x: float, y: float, xx: float, xy: float, yy: float) -> tuple[Any, ...]:
         dx, dy = x - node.x, y - node.y
         squared = dx * dx + dy * dy
         if xx + yy > 0.0:  # smoothed over the belief's own width, which reaches beyond the floor
@@ -109,13 +109,13 @@ class Level(Measurement):
         return (Line(level(m, squared), slope * dx, slope * dy, m.noise * m.noise),)
 
     @staticmethod
-    def signal(m, stream, number, node, x, y):
+    def signal(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> float:
         noise, _ = draws.normal_pair(stream, number)
         dx, dy = node.x - x, node.y - y
         return level(m, dx * dx + dy * dy) + m.noise * noise
 
     @staticmethod
-    def weigh(m, px, py, log_weights, node, value):
+    def weigh(m: Any, px: np.ndarray, py: np.ndarray, log_weights: np.ndarray, node: Any, value: Any) -> None:
         half_precision = F(0.5 / max(m.noise * m.noise, 1e-20))
         sx, sy, z = F(node.x), F(node.y), F(value[0])
         at_1m, slope, floor = F(m.at_1m), F(m.slope), F(max(m.floor_m * m.floor_m, 1e-12))

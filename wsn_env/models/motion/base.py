@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -72,12 +72,12 @@ class Motion(Kind):
 
 
 @by_kind
-def draw(m, stream, course, track):
+def draw(m: Any, stream: Any, course: Any, track: np.ndarray) -> Any:
     """Fill `track` (periods + 1, 4) with the true states."""
 
 
 @piece
-def reflect(state, axis, side_m):
+def reflect(state: Any, axis: int, side_m: float) -> None:
     """Fold a coordinate back into [0, side], as a mirror at the border would."""
     x = state[axis] - 2.0 * side_m * np.floor(state[axis] / (2.0 * side_m))
     if x > side_m:
@@ -87,7 +87,7 @@ def reflect(state, axis, side_m):
 
 
 @piece
-def heading_of(s, c):
+def heading_of(s: float, c: Any) -> float:
     """The angle in (-pi, pi] of a unit vector, by Newton's steps from the octant (no libm)."""
     angle = 0.0
     if c < 0.0:
@@ -101,6 +101,6 @@ def heading_of(s, c):
 
 
 @lean_piece
-def set_state(state, x, vx, y, vy):
+def set_state(state: Any, x: float, vx: float, y: float, vy: float) -> None:
     """Write a true state (4,)."""
     state[0], state[1], state[2], state[3] = x, vx, y, vy

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
 
 from wsn_env.compiled.elementary import HALF_PI, sincos
 from wsn_env.models.motion.base import Motion, set_state
@@ -30,7 +32,7 @@ class Circle(Motion):
             raise self._limit("circle_m", f"at most half the side, {scenario.field.side_m / 2} m")
 
     @staticmethod
-    def draw(m, stream, course, track):
+    def draw(m: Any, stream: Any, course: Any, track: np.ndarray) -> None:
         w = 4.0 * HALF_PI / m.turn_s
         for k in range(len(track)):
             s, c = sincos(w * k * course.period_s)

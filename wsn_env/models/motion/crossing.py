@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.models.motion.base import Motion, set_state
@@ -46,7 +48,7 @@ class Crossing(Motion):
             raise self._limit("crossing_m", allowed)
 
     @staticmethod
-    def draw(m, stream, course, track):
+    def draw(m: Any, stream: Any, course: Any, track: np.ndarray) -> None:
         steps = len(track) - 1
         inner = course.side_m - 2.0 * m.margin_m
         draw = 0

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import HALF_PI, sincos
@@ -49,7 +51,7 @@ class Cruise(Motion):
             raise self._limit("speed_ms", allowed)
 
     @staticmethod
-    def draw(m, stream, course, track):
+    def draw(m: Any, stream: Any, course: Any, track: np.ndarray) -> None:
         steps = len(track) - 1
         inner, first = course.side_m - 2.0 * m.inset_m, 0
         for attempt in range(2 * TRIES):  # the first that stays inside; after TRIES without noise

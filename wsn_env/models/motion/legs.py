@@ -27,7 +27,7 @@ class Legs(RecordedMotion):
     start_m: tuple[float, float] = (5.0, 5.0)  # x, y
     legs: tuple[tuple[float, float, float], ...] = ((100.0, 0.9, 0.9),)  # s, m/s along x, m/s along y
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         super().__post_init__()
         start = self._finite("start_m", (2,), "a finite pair (x, y) in m")
         legs = self._finite("legs", (-1, 3), "finite triples (seconds, vx, vy) in s and m/s, at least one")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -24,7 +24,7 @@ class RecordedMotion(Motion):
     abstract: ClassVar[bool] = True
 
     @staticmethod
-    def draw(m, stream, course, track):
+    def draw(m: Any, stream: Any, course: Any, track: np.ndarray) -> None:
         """One of them, by the episode's key."""
         track[:] = course.recorded[int(draws.uniform(stream, 0) * len(course.recorded))]
 
@@ -41,7 +41,7 @@ class Recorded(RecordedMotion):
     tracks: tuple[str, ...] = ()
     span_m: float | None = quantity(80.0, "scale to this extent and centre; None: as recorded", above=0, optional=True)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         names = (self.tracks,) if isinstance(self.tracks, (str, Path)) else self.tracks
         object.__setattr__(self, "tracks", tuple(str(name) for name in names))
         if not self.tracks:

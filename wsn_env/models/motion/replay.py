@@ -29,7 +29,7 @@ class Replay(RecordedMotion):
     fitting_q: ClassVar[float] = 0.2
     recording: str = ""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         object.__setattr__(self, "recording", str(self.recording))
         if not self.recording:
             raise ScenarioError("Replay.recording = '': must name a file such as straight_01_all_sensors.mbd")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import HALF_PI, sincos
@@ -30,7 +32,7 @@ class Turns(Motion):
             raise self._limit("speed_ms", f"at most {fastest} m/s, a side of the field in a period")
 
     @staticmethod
-    def draw(m, stream, course, track):
+    def draw(m: Any, stream: Any, course: Any, track: np.ndarray) -> None:
         track[0, 0] = course.side_m * (0.1 + 0.8 * draws.uniform(stream, 0))
         track[0, 2] = course.side_m * (0.1 + 0.8 * draws.uniform(stream, 1))
         heading = 4.0 * HALF_PI * draws.uniform(stream, 2)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -30,7 +30,7 @@ class Waypoint(Motion):
             raise self._limit("speed_ms", f"at most {fastest} m/s, a side of the field in a period")
 
     @staticmethod
-    def draw(m, stream, course, track):
+    def draw(m: Any, stream: Any, course: Any, track: np.ndarray) -> None:
         x = course.side_m * draws.uniform(stream, 0)
         y = course.side_m * draws.uniform(stream, 1)
         goal_x = course.side_m * draws.uniform(stream, 2)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -133,22 +133,22 @@ class Link(Kind):
         return 0.0
 
     @staticmethod
-    def transmission(r, bits, squared):
+    def transmission(r: Any, bits: float, squared: float) -> float:
         """Energy of sending `bits` over a squared distance [J]: bits (e1 + e2 d^2), eq. 5."""
         return bits * (r.tx_j_per_bit + r.amplifier_j_per_bit_m2 * squared)
 
     @staticmethod
-    def reception(r, bits):
+    def reception(r: Any, bits: float) -> float:
         """Energy of receiving `bits` [J]: bits e_r."""
         return bits * r.rx_j_per_bit
 
     @staticmethod
-    def relayed(r, bits, squared):
+    def relayed(r: Any, bits: float, squared: float) -> float:
         """`transmission` over as many hops as it takes, with what the relays pay for receiving."""
         hops = max(np.ceil(np.sqrt(squared) / r.hop_m), 1.0)
         return hops * transmission(r, bits, squared) + (hops - 1.0) * reception(r, bits)
 
 
-transmission = by_kind(Link.transmission)
-reception = by_kind(Link.reception)
-relayed = by_kind(Link.relayed)
+transmission: Any = by_kind(Link.transmission)
+reception: Any = by_kind(Link.reception)
+relayed: Any = by_kind(Link.relayed)

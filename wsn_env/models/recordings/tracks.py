@@ -1,13 +1,14 @@
 """Recorded tracks from CSV files."""
 
 import csv
+from typing import Any
 
 import numpy as np
 
 from wsn_env.models.quantity import ScenarioError
 
 
-def read_track(path: str, span_m: float | None, scenario) -> np.ndarray:
+def read_track(path: str, span_m: float | None, scenario: Any) -> np.ndarray:
     """A recorded track (periods + 1, 4), resampled linearly to the horizon, scaled and centred on request.
 
     Args:
