@@ -53,7 +53,7 @@ def store_folder() -> Path:
     return home / "wsn_env" / "kernels"
 
 
-def open_kernel(function: FunctionType, options: dict, arguments: tuple) -> tuple[Any, ...]:
+def open_kernel(function: FunctionType, options: dict[str, Any], arguments: tuple[Any, ...]) -> tuple[Any, ...]:
     """The compiled function, from the store if it is there, and what it returns for these arguments."""
     with _lock:
         name = f"{function.__module__}.{function.__qualname__}"
@@ -84,7 +84,7 @@ def open_kernel(function: FunctionType, options: dict, arguments: tuple) -> tupl
         return dispatcher, result
 
 
-def _without_collecting(dispatcher, arguments: tuple):
+def _without_collecting(dispatcher, arguments: tuple[Any, ...]):
     """A first call. Compiling makes millions of objects; to look for garbage among them takes a tenth of its time."""
     collects = gc.isenabled()
     gc.disable()
@@ -95,7 +95,7 @@ def _without_collecting(dispatcher, arguments: tuple):
             gc.enable()
 
 
-def _dispatcher(function: FunctionType, options: dict, source: Path):
+def _dispatcher(function: FunctionType, options: dict[str, Any], source: Path):
     """Numba's, of the same code, said to stand in the store."""
     code = function.__code__.replace(co_filename=str(source), co_firstlineno=1)
     twin = FunctionType(code, function.__globals__, function.__name__, function.__defaults__, function.__closure__)

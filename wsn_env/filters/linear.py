@@ -25,7 +25,8 @@ class LinearModel:
     """The measurement of a scenario."""
 
     def __init__(self, scenario: Scenario) -> None:
-        self._constants, self.values = constants(scenario), scenario.measurement.values
+        self._constants = constants(scenario)
+        self.values: int = scenario.measurement.values
 
     def lines(self, x: float, y: float, places: np.ndarray, values: np.ndarray) -> Lines:
         """About a target at (x, y).

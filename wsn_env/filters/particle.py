@@ -19,7 +19,7 @@ class ParticleTracker:
     """
 
     def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False) -> None:
-        self.particles = scenario.tracking.particles
+        self.particles: int = scenario.tracking.particles
         self.threads = threads
         self._filter_rows = compiling.fast(kernels.filter_rows) if fast else kernels.filter_rows
         self._constants = constants(scenario)

@@ -25,8 +25,9 @@ class Canvas:
             image: (H, W, 3) uint8, drawn into.
         """
         self.image = image
-        self.height, self.width = image.shape[:2]
-        self.clip = (0, 0, self.width, self.height)  # left, top, right, bottom
+        self.height: int = image.shape[0]
+        self.width: int = image.shape[1]
+        self.clip: tuple[int, int, int, int] = (0, 0, self.width, self.height)  # left, top, right, bottom
         self._most = np.zeros(image.shape[:2], np.float32)
         self._steps = np.zeros(self.width + 1, np.float32)
 
