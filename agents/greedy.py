@@ -16,7 +16,7 @@ from wsn_env.models.field import squared_distance
 from wsn_env.models.measurement.base import informs
 from wsn_env.models.quantity import check_quantity
 from wsn_env.models.radio.base import reception, relayed, transmission
-from wsn_env.models.state import Cluster, Sensors, knowledge_at
+from wsn_env.models.state import Cluster, knowledge_at, sensors_of
 from wsn_env.scenario.constants import constants
 from wsn_env.simulation.messages import in_one_hop
 from wsn_env.simulation.view import View
@@ -84,7 +84,7 @@ def _bargain(start, stop, cs, handle, lams, parts, nodes, heads, members):
     known, c = knowledge_at(handle), cs[0]
     for b in range(start, stop):
         network, belief = known.network, known.belief[b]
-        sensors, old = Sensors(network.positions[b], known.receivers[b]), network.row[b].head
+        sensors, old = sensors_of(known, b), network.row[b].head
         awake, lam, part = network.members[b, : network.row[b].n_members], lams[b], parts[b]
         moved = _gather(heads[b], members[b], sensors, belief, old, awake, lam, part, nodes[b], c)
         if old >= 0 and old != heads[b]:

@@ -194,7 +194,7 @@ def _weigh_period(x, log_weights, handle, cs, maps, scratch):
 
 @numba.njit
 def weigh_state(x, log_weights, positions, node, value, cs):
-    weigh(cs[0].measurement, x[0], x[2], log_weights, 0, 1, node_at(positions, node), value)
+    weigh(cs[0].measurement, x[0], x[2], log_weights, node_at(positions, node), value)
 
 
 def cloud(width=30.0, n=500):

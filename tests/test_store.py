@@ -135,12 +135,49 @@ def test_an_edit_of_a_kind_compiles_what_uses_the_kind(folder):
             """
         )
     )
-    assert run(folder, "kinds.py")[0] == ["3.0", "1.0", "1"]  # one kernel, for two types
+    assert run(folder, "kinds.py")[0] == ["3.0", "1.0", "2"]  # one kernel, for each of two types
     assert run(folder, "kinds.py")[0] == ["3.0", "1.0", "0"]
     edit(folder / "kinds.py", "About a point.", "About another.")
     assert run(folder, "kinds.py")[0] == ["3.0", "1.0", "0"]
     edit(folder / "kinds.py", "OFFSET = 2.0", "OFFSET = 3.0")
     assert run(folder, "kinds.py")[0] == ["4.0", "1.0", "1"]
+
+
+def test_another_layout_of_a_record_compiles_what_reads_it(folder):
+    """Kernels read a record's arrays by their places in the handle: with a stale one they would read elsewhere."""
+    (folder / "layout.py").write_text(
+        textwrap.dedent(
+            """
+            from dataclasses import dataclass
+            import numpy as np
+            from wsn_env.compiled import store
+            from wsn_env.compiled.arrays import Arrays, array, opener
+            from wsn_env.compiled.kernels import kernel
+
+            @dataclass(frozen=True, eq=False)
+            class Pair(Arrays):
+                first: np.ndarray = array(float, "rows")
+                second: np.ndarray = array(float, "rows")
+
+            pair_at = opener(Pair)
+
+            @kernel
+            def second(handle):
+                return pair_at(handle).second[0]
+
+            pair = Pair.zeros(rows=3)
+            pair.first[:], pair.second[:] = 1.0, 2.0
+            print(second(pair.handle), len(store.compiled))
+            """
+        )
+    )
+    assert run(folder, "layout.py")[0] == ["2.0", "1"]
+    assert run(folder, "layout.py")[0] == ["2.0", "0"]
+    lines = '    first: np.ndarray = array(float, "rows")\n', '    second: np.ndarray = array(float, "rows")\n'
+    edit(folder / "layout.py", lines[0] + lines[1], lines[1] + lines[0])
+    assert run(folder, "layout.py")[0] == ["2.0", "1"]
+    edit(folder / "layout.py", lines[1], '    other: np.ndarray = array(int, "rows", "columns")\n' + lines[1])
+    assert run(folder, "layout.py")[0] == ["2.0", "1"]
 
 
 PLAY = """

@@ -130,6 +130,15 @@ def _leaf_types(cls: type[Arrays]) -> list[tuple[np.dtype, int]]:
     return found
 
 
+def _layout(cls: type[Arrays]) -> list:
+    """Every field with what it holds: kernels read them by their places."""
+    found: list = []
+    for item in fields(cls):
+        about = item.metadata
+        found.append((item.name, _layout(about["part"]) if "part" in about else (about["dtype"], len(about["axes"]))))
+    return found
+
+
 def _words(cls: type[Arrays]) -> int:
     """How long a handle is."""
     return sum(1 + dimensions for _, dimensions in _leaf_types(cls))
@@ -147,7 +156,7 @@ class _AddressModel(models.PrimitiveModel):
         super().__init__(dmm, fe_type, WORD)
 
 
-WORD = ir.IntType(64)
+WORD: Any = ir.IntType(64)
 
 _known: dict[type[Arrays], Any] = {}  # the compiled type of each class
 
@@ -236,5 +245,5 @@ def opener(cls: type[Arrays]) -> Any:
         return lambda handle: address_of(handle)
 
     named.__qualname__ = f"{cls.__name__}_at"
-    named.__kernel_layout__ = repr(_leaf_types(cls))
+    named.__kernel_layout__ = repr(_layout(cls))  # counts in stamps
     return named

@@ -61,8 +61,8 @@ def _contents(function: FunctionType) -> tuple[str, list[FunctionType]]:
     for name, value in sorted(_named(function).items(), key=lambda pair: pair[0]):
         other = plain_function(value)
         if other is not None:
-            options = getattr(value, "targetoptions", {})
-            texts.append(f"{name}: {other.__module__}.{other.__qualname__} {options_text(options)}")
+            options, layout = getattr(value, "targetoptions", {}), getattr(value, "__kernel_layout__", "")
+            texts.append(f"{name}: {other.__module__}.{other.__qualname__} {options_text(options)} {layout}")
             others.append(other)
         else:
             texts.append(f"{name} = {_value(value)}")
@@ -105,8 +105,7 @@ def _value(value: object) -> str:
     if isinstance(value, np.ndarray):
         return f"{value.dtype} {value.shape} {value.tobytes().hex()}"
     if isinstance(value, type):
-        layout = getattr(value, "__kernel_layout__", None) or getattr(value, "_fields", "")
-        return f"{value.__module__}.{value.__qualname__} {layout}"
+        return f"{value.__module__}.{value.__qualname__} {getattr(value, '_fields', '')}"
     if callable(value):
         return f"{getattr(value, '__module__', '')}.{getattr(value, '__qualname__', type(value).__qualname__)}"
     return repr(value)

@@ -12,7 +12,7 @@ from wsn_env.compiled.kernels import lean_kernel
 from wsn_env.envs.merit import KEEP, NEAREST, ORDERS, fill_chances, rank_row
 from wsn_env.models.measurement.base import Order
 from wsn_env.models.quantity import suggest
-from wsn_env.models.state import KEEP_CLUSTER, Cluster, Sensors, knowledge_at
+from wsn_env.models.state import KEEP_CLUSTER, Cluster, knowledge_at, sensors_of
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import constants
 from wsn_env.simulation.view import View
@@ -92,7 +92,7 @@ def _read_menu(start, stop, cs, by, actions, nodes, handle, scratch, ordered, he
         if action <= 0:
             rule, further = KEEP, 0
         mean, cov, lam = known.belief[b].predicted_mean, known.belief[b].predicted_cov, known.row[b].lam
-        sensors = Sensors(known.network.positions[b], known.receivers[b])
+        sensors = sensors_of(known, b)
         if by != NEAREST:
             fill_chances(sensors, nodes[b], mean, cov, cs[0], chances[b])
         heads[b] = rank_row(

@@ -8,7 +8,7 @@ from wsn_env.compiled.elementary import log
 from wsn_env.compiled.kernels import lean_piece
 from wsn_env.envs.merit import chance_of, gain, place_of
 from wsn_env.models.field import squared_distance
-from wsn_env.models.state import Sensors
+from wsn_env.models.state import Sensors, sensors_of
 
 BELIEF_FEATURES = (
     "lam",  # log, halved
@@ -67,7 +67,7 @@ def describe_belief(
     f[10] = 0.25 * known.reports.count[b]
     if standing.head >= 0:
         is_nearest, n = standing.head == nodes[0], standing.n_members
-        sensors = Sensors(network.positions[b], known.receivers[b])
+        sensors = sensors_of(known, b)
         _describe_head(standing.head, is_nearest, network.members[b], n, sensors, m, p, ex, ey, c, f)
     f[18] = distances[min(NINTH, len(distances)) - 1] / c.radius_m
     return ex, ey

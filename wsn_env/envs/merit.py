@@ -17,7 +17,7 @@ from wsn_env.models.measurement.base import (
     packets_a_report,
 )
 from wsn_env.models.radio.base import reception, transmission
-from wsn_env.models.state import Sensors, knowledge_at
+from wsn_env.models.state import Sensors, knowledge_at, sensors_of
 from wsn_env.simulation.messages import outside
 
 ORDERS: tuple[Order, ...] = ("nearest", "information", "value")
@@ -95,6 +95,12 @@ def _drop_by_two(lines, probability, p00, p01, p11):
     c11 = share * (g10 * g10 * s11 - 2.0 * g10 * s01 * g11 + g11 * g11 * s00)
     c01 = share * (g00 * s11 * g10 - g00 * s01 * g11 - g01 * s01 * g10 + g01 * s00 * g11)
     return c00 + c11, p00 - c00, p01 - c01, p11 - c11
+
+
+@lean_piece
+def awake_j(sensors: Sensors, node: int, c: Any) -> float:
+    """What a node pays for being awake for a period instead of asleep, packets apart [J]."""
+    return c.radio.awake_j - c.radio.asleep_j
 
 
 @lean_piece
@@ -282,6 +288,6 @@ def order_by_merit(
     chances, left, drops = np.empty(nodes.shape[1]), np.empty(nodes.shape[1]), np.empty(nodes.shape[1])
     for b in range(start, stop):
         mean, cov = known.belief[b].predicted_mean, known.belief[b].predicted_cov
-        sensors = Sensors(known.network.positions[b], known.receivers[b])
+        sensors = sensors_of(known, b)
         fill_chances(sensors, nodes[b], mean, cov, cs[0], chances)
         order_row(sensors, heads[b], mean, cov, lams[b], nodes[b], chances, cs[0], left, ordered[b], drops)

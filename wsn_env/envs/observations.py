@@ -22,7 +22,7 @@ from wsn_env.envs.merit import ORDERS, fill_chances, order_row, rank_row
 from wsn_env.envs.prospects import ENTRY_FEATURES, describe_entries, describe_standing, foresee
 from wsn_env.models.measurement.base import Order
 from wsn_env.models.quantity import suggest
-from wsn_env.models.state import Sensors, knowledge_at
+from wsn_env.models.state import knowledge_at, sensors_of
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import constants
 from wsn_env.simulation.geometry import find_candidates
@@ -69,7 +69,7 @@ def _encode_candidates(start, stop, cs, handle, battery_j, rows, whole, real, ou
         f = out[b]
         ex, ey = describe_belief(known, b, nodes[b], distances[b], c, f[:G])
         f[G:] = 0.0
-        sensors, members = Sensors(network.positions[b], known.receivers[b]), network.members[b]
+        sensors, members = sensors_of(known, b), network.members[b]
         fill_chances(sensors, nodes[b], m, p, c, chances[b])
         for k in range(nodes.shape[1]):
             node, g = nodes[b, k], f[G + k * width : G + (k + 1) * width]
@@ -103,7 +103,7 @@ def _encode_menu(start, stop, cs, handle, terms, rows, whole, real, out):
             continue
         network = known.network
         m, p, standing = known.belief[b].predicted_mean, known.belief[b].predicted_cov, network.row[b]
-        sensors = Sensors(network.positions[b], known.receivers[b])
+        sensors = sensors_of(known, b)
         members, lam = network.members[b], known.row[b].lam
         find_candidates(network, b, m[0], m[2], c.ring_m, nodes[b], distances[b])
         f = out[b]

@@ -6,7 +6,7 @@ import numpy as np
 
 from wsn_env.compiled.elementary import expected_error, log
 from wsn_env.compiled.kernels import lean_piece
-from wsn_env.envs.merit import chance_of, fill_chances, gain, known_chance, place_of
+from wsn_env.envs.merit import awake_j, chance_of, fill_chances, gain, known_chance, place_of
 from wsn_env.models.field import squared_distance
 from wsn_env.models.measurement.base import chance, node_of, packets_a_report
 from wsn_env.models.radio.base import reception, transmission
@@ -162,7 +162,7 @@ def _add_head(sensors, head, old, known, m, p, after, sums, c):
     """The head's own report, and the handover to it [mJ]."""
     detection, later = _chances(sensors, head, known, m, p, c)
     _, p00, p01, p11 = gain(detection * c.radio.head_delivery, sensors, head, m, p, after[0], after[1], after[2], c)
-    joules = c.radio.awake_j - c.radio.asleep_j
+    joules = awake_j(sensors, head, c)
     if not c.radio.to_head:
         joules += _report_j(sensors, head, head, detection, m, c)
     elif old >= 0 and head != old:
@@ -178,7 +178,7 @@ def _add(sensors, node, head, called, known, m, p, after, sums, c):
     """A member's report, its invitation if it is called, its being awake [mJ]."""
     detection, later = _chances(sensors, node, known, m, p, c)
     _, p00, p01, p11 = gain(detection * c.radio.delivery, sensors, node, m, p, after[0], after[1], after[2], c)
-    joules = c.radio.awake_j - c.radio.asleep_j + _report_j(sensors, node, head, detection, m, c)
+    joules = awake_j(sensors, node, c) + _report_j(sensors, node, head, detection, m, c)
     if called:
         joules += reception(c.radio, c.radio.invitation_bits)
         if c.radio.to_head:

@@ -1,8 +1,12 @@
 """Registers the environments' ids with Gymnasium, once."""
 
+from pathlib import Path
+
 from gymnasium.envs.registration import register, registry
 
-IDS = ("PreDC-v0", "Rssi-v0", "Binary-v0", "Anchors-v0", "Underwater-v0", "Ble-v0")
+PRESETS = Path(__file__).parents[1] / "scenario" / "presets"
+
+IDS = tuple(sorted(path.stem.replace("_", "-") for path in PRESETS.glob("*_v*.py")))  # without importing them
 
 
 def register_envs() -> None:

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wsn_env.compiled.arrays import Arrays, array, opener, part, record
+from wsn_env.compiled.kernels import inline_piece
 from wsn_env.models.measurement.beacon_levels import RECEIVER
 
 BELIEF = record(
@@ -160,6 +161,12 @@ class Sensors(NamedTuple):
 
     positions: np.ndarray  # (S, 2) m
     receivers: np.ndarray  # (S,) RECEIVER; else (0,)
+
+
+@inline_piece
+def sensors_of(known: Any, b: int) -> Sensors:
+    """The nodes of row b of what the network knows (Knowledge)."""
+    return Sensors(known.network.positions[b], known.receivers[b])
 
 
 KEEP_HEAD, KEEP_CLUSTER, NOBODY = -1, -2, -3

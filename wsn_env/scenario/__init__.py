@@ -1,5 +1,5 @@
 """What is simulated: a scenario of quantities with units, and the published systems as presets."""
 
-from wsn_env.scenario.scenario import PRESETS, Scenario
+from wsn_env.scenario.scenario import Scenario, presets
 
-__all__ = ["PRESETS", "Scenario"]
+__all__ = ["Scenario", "presets"]

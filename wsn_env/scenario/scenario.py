@@ -3,53 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, is_dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
+from importlib import import_module
+from pkgutil import iter_modules
 from typing import Any, Unpack, cast
 
 import numpy as np
 
 from wsn_env.models.detection.base import DetectionRule
 from wsn_env.models.detection.radius import Detection
-from wsn_env.models.detection.threshold import Threshold
 from wsn_env.models.field import Field
 from wsn_env.models.kinds import Kind, Registry
 from wsn_env.models.library import DETECTIONS, MEASUREMENTS, MOTIONS, RADIOS
 from wsn_env.models.measurement.base import Measurement
-from wsn_env.models.measurement.beacon import Beacon
-from wsn_env.models.measurement.binary import Binary
 from wsn_env.models.measurement.position import Position
-from wsn_env.models.measurement.rssi import Rssi
-from wsn_env.models.measurement.sonar import Sonar
 from wsn_env.models.motion.base import Motion
 from wsn_env.models.motion.crossing import Crossing
-from wsn_env.models.motion.cruise import Cruise
-from wsn_env.models.motion.walk import Walk
 from wsn_env.models.own import kind_and_settings
 from wsn_env.models.quantity import NUMBERS, ScenarioError, Section, quantity, suggest
 from wsn_env.models.radio.base import Link
-from wsn_env.models.radio.bluetooth import Bluetooth
-from wsn_env.models.radio.modem import Modem
 from wsn_env.models.radio.radio import Radio
 from wsn_env.models.recordings.replay import read_quantities
 from wsn_env.scenario.quantities import Quantities
 from wsn_env.scenario.tracking import BOUNDARY_TRACKERS, Tracking, reads
-
-RING_OF_EIGHT = tuple((x, y) for y in (0.0, 100.0, 200.0) for x in (0.0, 100.0, 200.0) if (x, y) != (100.0, 100.0))
-
-DONGLES = (  # m, in the order of the dataset's file
-    (7.00, 7.09),
-    (7.18, 0.68),
-    (0.71, 6.16),
-    (7.25, 11.36),
-    (0.76, 12.13),
-    (7.18, 17.64),
-    (13.14, 12.33),
-    (12.82, 16.83),
-    (18.12, 11.93),
-    (13.01, 5.51),
-    (17.77, 6.33),
-    (12.76, 0.27),
-)
 
 PARTS: dict[str, type] = {
     "name": str,
@@ -208,13 +184,13 @@ class Scenario(Section):
         """A preset, with overrides by quantity.
 
         Args:
-            name: one of PRESETS, with or without "wsn_env/".
+            name: one of `presets()`, with or without "wsn_env/".
             overrides: as for `override`.
         """
         short = name.removeprefix("wsn_env/")
-        if short not in PRESETS:
-            raise ScenarioError(f"scenario {name!r} is unknown: {suggest(short, PRESETS)}")
-        return PRESETS[short].override(**overrides)
+        if short not in presets():
+            raise ScenarioError(f"scenario {name!r} is unknown: {suggest(short, presets())}")
+        return presets()[short].override(**overrides)
 
     def override(self, **quantities: Unpack[Quantities]) -> Scenario:
         """A copy with some quantities changed, whatever section they stand in.
@@ -295,84 +271,9 @@ def _words(name: str, part: type) -> str:
     return " or ".join(kind.__name__ for kind in kinds) or part.__name__
 
 
-PRESETS = {
-    "PreDC-v0": Scenario(name="PreDC-v0"),
-    "Rssi-v0": Scenario(name="Rssi-v0", reference_error_m=4.0, measurement=Rssi()),
-    "Binary-v0": Scenario(
-        name="Binary-v0",
-        periods=50,
-        lam=2.0,
-        typical_error_m=1.5,
-        reference_error_m=30.0,
-        reference_energy_mj=1.0,
-        field=Field(nodes=600, side_m=500.0),
-        motion=Crossing(margin_m=60.0, crossing_m=250.0, acceleration_ms2=0.1),
-        detection=Detection(radius_m=60.0, softness=1e-6, ceiling=1.0),
-        measurement=Binary(),
-        radio=Radio(receiver="sink", report_bits=64, invitation_bits=0),
-        tracking=Tracking(filter_q=0.3, start_sd_m=10.0, start_sd_ms=1.0, rest_sd_ms=10.0),
-    ),
-    "Anchors-v0": Scenario(
-        name="Anchors-v0",
-        lam=10.0,
-        typical_error_m=11.0,
-        reference_error_m=40.0,
-        reference_energy_mj=3.0,
-        periods=50,
-        field=Field(side_m=200.0, positions=RING_OF_EIGHT),
-        motion=Crossing(margin_m=20.0, crossing_m=80.0, acceleration_ms2=0.5),
-        detection=Detection(radius_m=360.0, ceiling=1.0),
-        measurement=Rssi(exponent=3.0),
-        radio=Radio(receiver="target", report_bits=128, invitation_bits=0, retries=0),
-        tracking=Tracking(filter_q=1.0, start_sd_m=10.0, start_sd_ms=1.0, search=False),
-    ),
-    "Underwater-v0": Scenario(
-        name="Underwater-v0",
-        period_s=5.0,
-        lam=0.006,
-        typical_error_m=16.0,
-        typical_energy_mj=1400.0,
-        reference_error_m=120.0,
-        reference_energy_mj=2200.0,
-        field=Field(nodes=64, side_m=1000.0, layout="grid"),
-        motion=Cruise(),
-        detection=Threshold(),
-        measurement=Sonar(),
-        radio=Modem(),
-        tracking=Tracking(
-            particles=1000,
-            silent_information=True,
-            resampling="spread",
-            start_sd_m=20.0,
-            start_sd_ms=1.0,
-        ),
-    ),
-    # The twelve receivers, the hall and the noise of Danis, Naskali, Cemgil & Ersoy (2022), calibrated on six tracks.
-    "Ble-v0": Scenario(
-        name="Ble-v0",
-        lam=0.006,
-        typical_error_m=1.8,
-        typical_energy_mj=194.0,
-        reference_error_m=5.0,
-        reference_energy_mj=220.0,
-        unscored=3,
-        field=Field(side_m=20.66, depth_m=17.641, positions=DONGLES),
-        motion=Walk(),
-        detection=Detection(),
-        measurement=Beacon(
-            at_1m_db=(-60.1, -57.2, -58.8, -60.4, -61.8, -55.2, -64.3, -56.8, -61.3, -60.0, -56.7, -57.3),
-            exponents=(1.57, 1.80, 1.56, 1.70, 1.58, 1.95, 1.93, 1.74, 1.34, 2.19, 1.29, 1.79),
-            heights_m=(1.22, 2.30, 2.30) * 4,
-            beacon_m=1.8,
-        ),
-        radio=Bluetooth(),
-        tracking=Tracking(
-            particles=1000,
-            start="field",
-            rest_sd_ms=0.4,
-            velocity_s=10.0,
-            resample_below=0.6,
-            search=False,
-        ),
-    ),
-}
+@cache
+def presets() -> dict[str, Scenario]:
+    """The named scenarios by id: the files of `scenario.presets`, found by themselves."""
+    package = "wsn_env.scenario.presets"
+    names = sorted(module.name for module in iter_modules(import_module(package).__path__))
+    return {name.replace("_", "-"): import_module(f"{package}.{name}").SCENARIO for name in names}

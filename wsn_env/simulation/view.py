@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from wsn_env.models.state import BELIEF, NETWORK, RECEIVER, STATE, Cluster, Grid, Knowledge, Network, Reports, State
+from wsn_env.models.state import Cluster, Grid, Knowledge, Network, Reports, State
 from wsn_env.simulation import geometry
 
 HEARING = ("latest_db", "gradient", "variance")  # of a beacon's receivers, what policies ask for
@@ -208,31 +208,31 @@ class View:
         if a["battery"].ndim == 1:
             a = {name: value[None] for name, value in a.items()}
         rows, nodes = a["battery"].shape
-        others = a["member"].astype(bool)
-        row, belief, network_row = np.zeros(rows, STATE), np.zeros(rows, BELIEF), np.zeros(rows, NETWORK)
-        for name in ("period", "lam", "luck", "log_miss"):
-            row[name] = a[name].reshape(rows)
-        for name in ("mean", "cov", "predicted_mean", "predicted_cov"):
-            belief[name] = a[name]
-        network_row["alive"] = (a["battery"] > 0).sum(axis=1)
-        network_row["head"] = a["head"].reshape(rows)
-        standing = np.flatnonzero(network_row["head"] >= 0)
-        others[standing, network_row["head"][standing]] = False
-        members, network_row["n_members"] = _lists(others)
-        node, count = _lists(a["detected"].astype(bool))
-        value = np.take_along_axis(a["measured"], np.maximum(node, 0)[:, :, None].astype(np.int64), axis=1)
         side = Grid.side(nodes)
-        grid = Grid.zeros(rows=rows, nodes=nodes, cells=side * side + 1)
-        grid.row["side"] = side
-        positions, battery = (np.ascontiguousarray(a[name], np.float64) for name in ("positions", "battery"))
-        network = Network(network_row, positions, battery, members, grid)
+        of_kinds = {"states": nodes if "bitmap" in a else 0, "receivers": nodes if HEARING[0] in a else 0}
+        known = Knowledge.zeros(rows=rows, nodes=nodes, cells=side * side + 1, **of_kinds)
+        for name in ("period", "lam", "luck", "log_miss"):
+            known.row[name] = a[name].reshape(rows)
+        for name in ("mean", "cov", "predicted_mean", "predicted_cov"):
+            known.belief[name] = a[name]
+        for name in HEARING if known.receivers.size else ():
+            known.receivers[name] = a[name]
+
+        network, reports = known.network, known.reports
+        network.positions[:], network.battery[:] = a["positions"], a["battery"]
+        network.grid.row["side"] = side
         geometry.index(network)
-        bitmap = np.ascontiguousarray(a.get("bitmap", np.zeros((rows, 0), np.int8)), np.int8)
-        receivers = np.zeros((rows, nodes if HEARING[0] in a else 0), RECEIVER)
-        for name in HEARING if receivers.size else ():
-            receivers[name] = a[name]
-        reports = Reports(count, node, value, bitmap)
-        return cls(Knowledge(row, network, reports, belief, receivers))
+        others, heads = a["member"].astype(bool), a["head"].reshape(rows)
+        network.row["alive"], network.row["head"] = (a["battery"] > 0).sum(axis=1), heads
+        others[heads >= 0, heads[heads >= 0]] = False
+        network.members[:], network.row["n_members"] = _lists(others)
+
+        reports.node[:], reports.count[:] = _lists(a["detected"].astype(bool))
+        slots = reports.node[:, :, None].astype(np.int64)
+        reports.value[:] = np.take_along_axis(a["measured"], np.maximum(slots, 0), axis=1)
+        if "bitmap" in a:
+            reports.bitmap[:] = a["bitmap"]
+        return cls(known)
 
 
 def _mask(nodes: np.ndarray, count: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from wsn_env.models.measurement.rssi import Rssi
 from wsn_env.models.motion.legs import Legs
 from wsn_env.papers.rollout import Record, Trial, play_all
 from wsn_env.scenario import Scenario
-from wsn_env.scenario.scenario import RING_OF_EIGHT
+from wsn_env.scenario.presets.Anchors_v0 import RING_OF_EIGHT
 from wsn_env.simulation.world import World
 
 PERIODS_S = (0.1, 0.2, 0.5, 1.0)

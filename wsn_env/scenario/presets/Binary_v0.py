@@ -1,0 +1,24 @@
+"""Binary sensors and a sink (Zhou, Cheng & Xing, 2009)."""
+
+from wsn_env.models.detection.radius import Detection
+from wsn_env.models.field import Field
+from wsn_env.models.measurement.binary import Binary
+from wsn_env.models.motion.crossing import Crossing
+from wsn_env.models.radio.radio import Radio
+from wsn_env.scenario.scenario import Scenario
+from wsn_env.scenario.tracking import Tracking
+
+SCENARIO = Scenario(
+    name="Binary-v0",
+    periods=50,
+    lam=2.0,
+    typical_error_m=1.5,
+    reference_error_m=30.0,
+    reference_energy_mj=1.0,
+    field=Field(nodes=600, side_m=500.0),
+    motion=Crossing(margin_m=60.0, crossing_m=250.0, acceleration_ms2=0.1),
+    detection=Detection(radius_m=60.0, softness=1e-6, ceiling=1.0),
+    measurement=Binary(),
+    radio=Radio(receiver="sink", report_bits=64, invitation_bits=0),
+    tracking=Tracking(filter_q=0.3, start_sd_m=10.0, start_sd_ms=1.0, rest_sd_ms=10.0),
+)

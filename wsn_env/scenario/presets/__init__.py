@@ -1,0 +1,1 @@
+"""The published systems and other named scenarios: a file each, whose name is the id with _ for -."""
