@@ -13,6 +13,7 @@ VENV := .venv
 PIP := --quiet --disable-pip-version-check --no-compile
 RUN := $(VENV)/bin/python
 READY := $(VENV)/.ready
+LINKS := out/types
 
 .PHONY: train pretrained test slow examples bench bench-short docs lint clean
 
@@ -61,8 +62,12 @@ $(VENV)/.docs: $(READY)
 	$(RUN) -m pip install $(PIP) -c constraints.txt -e ".[test,docs]"
 	touch $@
 
+# mypy sees the package as it is installed, with `agents` in it, through links.
 lint: $(READY)
 	$(VENV)/bin/ruff check . && $(VENV)/bin/ruff format --check .
+	rm -rf $(LINKS) && mkdir -p $(LINKS)/wsn_env
+	ln -s $(CURDIR)/wsn_env/* $(CURDIR)/agents $(LINKS)/wsn_env && ln -s $(CURDIR)/train.py $(LINKS)
+	cd $(LINKS) && $(CURDIR)/$(VENV)/bin/mypy --config-file $(CURDIR)/pyproject.toml --cache-dir $(CURDIR)/out/mypy wsn_env train.py
 
 $(READY): pyproject.toml constraints.txt Makefile
 	$(PYTHON) -m venv $(VENV)

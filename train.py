@@ -13,12 +13,13 @@ import time
 from collections import deque
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import torch
 import tyro
 from stable_baselines3 import PPO
+from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.utils import LinearSchedule
@@ -166,12 +167,8 @@ def train(settings: Training) -> None:
     check(settings)
     rules = opponents(scenario) if settings.episodes else {}
     torch.set_num_threads(settings.torch_threads)
-    speaks = Settings(
-        action=settings.action,
-        observation="menu" if settings.action == "menu" else "candidates",
-        reward=settings.reward,
-        order=settings.order,
-    )
+    spoken: dict[str, Any] = dict(action=settings.action, reward=settings.reward, order=settings.order)
+    speaks = Settings(observation="menu" if settings.action == "menu" else "candidates", **spoken)
     folder = open_folder(settings)
     learn = learn_on_ray if settings.engine == "ray" else learn_here
     network = learn(settings, scenario, speaks, folder)
@@ -202,7 +199,8 @@ def complete(settings: Training) -> Scenario:
         settings.level = default_level(scenario)
     if settings.vary is None:
         settings.vary = [f"nodes={nodes}" for nodes in default_node_counts(scenario)]
-    return scenario.override(lam=settings.lam[0] if len(settings.lam) == 1 else tuple(settings.lam))
+    low, high = settings.lam[0], settings.lam[-1]
+    return scenario.override(lam=low if len(settings.lam) == 1 else (low, high))
 
 
 def learn_here(settings: Training, scenario: Scenario, speaks: Settings, folder: Path) -> Network:
@@ -235,7 +233,7 @@ def learn_on_ray(settings: Training, scenario: Scenario, speaks: Settings, folde
     except ImportError as problem:
         raise ValueError(f"engine 'ray': pip install 'wsn_env[ray]' ({problem})") from None
 
-    whole = make_envs(settings, scenario, speaks, len(settings.vary) + 1)
+    whole = make_envs(settings, scenario, speaks, len(settings.vary or ()) + 1)
     training = RayTraining(
         lambda rows: make_envs(settings, scenario, speaks, rows),
         entries(settings, whole.single_observation_space),
@@ -243,7 +241,7 @@ def learn_on_ray(settings: Training, scenario: Scenario, speaks: Settings, folde
         rows=settings.rows,
         runners=settings.runners,
         rollout=settings.rollout,
-        level=settings.level,
+        level=settings.level or 0.0,
         seed=settings.seed,
         address=settings.address,
         lr=[[0, settings.learning_rate], [settings.steps, 0.0]],
@@ -263,7 +261,7 @@ def learn_on_ray(settings: Training, scenario: Scenario, speaks: Settings, folde
 
 def make_envs(settings: Training, scenario: Scenario, speaks: Settings, rows: int) -> ConcatVectorEnv:
     """The rows, dealt among the scenarios."""
-    scenarios = [scenario, *(scenario.override(**parse_overrides(text.split(","))) for text in settings.vary)]
+    scenarios = [scenario, *(scenario.override(**parse_overrides(text.split(","))) for text in settings.vary or ())]
     shares = np.diff(np.arange(len(scenarios) + 1) * rows // len(scenarios))
     parts = []
     for one, share in zip(scenarios, shares):
@@ -286,8 +284,9 @@ def check(settings: Training) -> None:
             raise ValueError(f"train.py: {name} = {getattr(settings, name)!r}: must be one of {', '.join(allowed)}")
     check_quantity("train.py", "runners", settings.runners, at_least=0, whole=True)
     shares = 1 if settings.engine == "local" else max(1, settings.runners)
-    if settings.rows // shares <= len(settings.vary):
-        least = shares * (len(settings.vary) + 1)
+    others = len(settings.vary or ())
+    if settings.rows // shares <= others:
+        least = shares * (others + 1)
         raise ValueError(f"train.py: rows = {settings.rows}: must be at least {least}, one a scenario and runner")
     if settings.engine == "ray" and settings.network != "entries":
         raise ValueError(f"train.py: network = {settings.network!r}: the engine ray trains only 'entries'")
@@ -375,7 +374,7 @@ def entries(settings: Training, space) -> dict:
     )
 
 
-def save_checkpoint(model: PPO, folder: Path) -> None:
+def save_checkpoint(model: BaseAlgorithm, folder: Path) -> None:
     """Whole or not at all."""
     with replacing(folder / "checkpoint.zip") as path, open(path, "wb") as file:
         model.save(file)
@@ -398,7 +397,9 @@ class Watch(BaseCallback):
         rms, error = mean_and_error(self._rms)
         self.logger.record("rollout/episode_rms_m", rms)
         self.logger.record("rollout/episode_rms_se_m", error)
-        self.logger.record("rollout/ep_rew_se", mean_and_error([info["r"] for info in self.model.ep_info_buffer])[1])
+        self.logger.record(
+            "rollout/ep_rew_se", mean_and_error([info["r"] for info in self.model.ep_info_buffer or ()])[1]
+        )
         self._report(min(self.num_timesteps, self._settings.steps), self._settings.steps, f"training, RMS {rms:.2f} m")
         if self.num_timesteps - self._saved >= self._settings.checkpoint_steps:
             save_checkpoint(self.model, self._folder)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,9 +38,9 @@ class Adaptive(ViewPolicy):
     order: str = "nearest"
     switches: Sequence[Switch] | None = None  # None: tuned for the scenario's name and order; else a usual one
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         check_order(self.order)
-        given = self.switches
+        given: Sequence[Any] | None = self.switches
         if given is None:
             given = tuned(self.scenario, RULES[self.order])
         if given is None:
@@ -56,7 +56,8 @@ class Adaptive(ViewPolicy):
         table = np.array(self.switches)
         _, few, many, spread_m, hysteresis_m = table[nearest_lam(table[:, 0], view.lam)].T
         sizes = np.where(view.spread_m > spread_m, many, few).astype(int)
-        return surround(view, self.scenario, self.order, hysteresis_m, sizes, max(each.many for each in self.switches))
+        most = max(each.many for each in self.switches or ())
+        return surround(view, self.scenario, self.order, hysteresis_m, sizes, most)
 
 
 def check_switches(switches: Sequence[Switch]) -> None:
@@ -70,4 +71,4 @@ def check_switches(switches: Sequence[Switch]) -> None:
 
 
 RULES = {"nearest": "adaptive", "information": "adaptive_informed"}
-adaptive_informed = partial(Adaptive, order="information")
+adaptive_informed: Callable[..., Adaptive] = partial(Adaptive, order="information")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +24,9 @@ class ViewPolicy:
         """Choose the clusters of the next period, for every row."""
         raise TypeError(f"{type(self).__name__} must define act(view)")
 
-    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
+    ) -> tuple[Any, ...]:
         """stable-baselines3's predict, on environments made with action="cluster", observation="view".
 
         Args:

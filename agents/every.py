@@ -19,12 +19,12 @@ class Every(ViewPolicy):
     n: int = 4
     sees_lam = False
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         check_quantity("Every", "n", self.n, at_least=1, whole=True)
 
     def act(self, view: View) -> Cluster:
         """Wake everybody or nobody, for every row."""
         now = view.period % self.n == 0
         between = np.where(view.head >= 0, view.head, view.nearest_living())
-        between = between if self.scenario.radio.receiver == "head" else NOBODY
-        return Cluster.of(np.where(now, view.nearest_living(), between), view.alive & now[:, None])
+        kept = between if self.scenario.radio.receiver == "head" else NOBODY
+        return Cluster.of(np.where(now, view.nearest_living(), kept), view.alive & now[:, None])

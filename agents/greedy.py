@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -46,8 +46,8 @@ class Greedy(ViewPolicy):
 
     terms: Sequence[Terms] | None = None  # None: tuned for the scenario's name; else usual ones
 
-    def __post_init__(self):
-        given = self.terms
+    def __post_init__(self) -> None:
+        given: Sequence[Any] | None = self.terms
         if given is None:
             given = tuned(self.scenario, "greedy") or [(self.scenario.lam_range[0], 3.0, 4.0)]
         terms = tuple(sorted(Terms(*each) for each in given))

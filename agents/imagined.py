@@ -5,6 +5,9 @@ Nothing of the truth enters: not the track, and not the key that the real detect
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
 from numba import uint64
 
 from wsn_env.compiled import draws
@@ -26,7 +29,7 @@ def imagined_world(scenario: Scenario, periods: int, particles: int) -> World:
     Args:
         particles: of a particle filter; 0: a `GaussianTracker`, which cannot read binary sensors.
     """
-    changes = dict(periods=periods, motion="straight", filter_q=scenario.filter_q)
+    changes: dict[str, Any] = dict(periods=periods, motion="straight", filter_q=scenario.filter_q)
     changes |= dict(tracker="particle", particles=max(particles, 2), gate_m=None)
     if scenario.radio.handover == "particles":  # as many as there really are
         changes |= dict(handover="estimate", handover_bits=scenario.handover_bits)
@@ -115,18 +118,26 @@ class GaussianTracker:
 
     particles = 0
 
-    def __init__(self, scenario: Scenario):
+    def __init__(self, scenario: Scenario) -> None:
         if not scenario.measurement.independent:
             raise ValueError("particles = 0: must be at least 2 where nodes report a state")
         self._constants = constants(scenario)
 
-    def start(self, keys, periods, rows, belief: Belief) -> None:
+    def start(self, keys: np.ndarray, periods: np.ndarray, rows: np.ndarray, belief: Belief) -> None:
         """Mean and covariance are all there is."""
 
-    def relocate(self, keys, periods, rows, belief: Belief) -> None:
+    def relocate(self, keys: np.ndarray, periods: np.ndarray, rows: np.ndarray, belief: Belief) -> None:
         """The search has set them."""
 
-    def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
+    def correct(
+        self,
+        keys: np.ndarray,
+        periods: np.ndarray,
+        belief: Belief,
+        network: Network,
+        reports: Reports,
+        resampled: np.ndarray,
+    ) -> None:
         """Correct the predictions with the reports, in place."""
         _correct_rows(self._constants, belief.row, network.positions, reports.count, reports.node, reports.value)
 
@@ -161,7 +172,7 @@ def _correct(mean, cov, hx, hy, innovation, r):
             cov[i, k] -= ph[i] * ph[k] / s
 
 
-def rows_of(value, rows):
+def rows_of(value: Any, rows: Any) -> Any:
     """Some rows of a View or of a record of arrays: a slice, or their numbers."""
     if isinstance(value, View):
         return View(rows_of(value.knowledge, rows))

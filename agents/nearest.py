@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +37,7 @@ class Nearest(ViewPolicy):
     order: str = "nearest"
     sees_lam = False
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         check_order(self.order)
         check_quantity("Nearest", "n", self.n, at_least=0, whole=True)
         check_quantity("Nearest", "hysteresis_m", self.hysteresis_m, at_least=0, optional=True)
@@ -48,7 +50,7 @@ class Nearest(ViewPolicy):
         return surround(view, self.scenario, self.order, self.hysteresis_m, self.n, self.n)
 
 
-def surround(view: View, scenario: Scenario, order: str, hysteresis_m, sizes, most: int) -> Cluster:
+def surround(view: View, scenario: Scenario, order: str, hysteresis_m: Any, sizes: Any, most: int) -> Cluster:
     """A head near the prediction and its further members in an order of merit.
 
     Args:
@@ -87,4 +89,4 @@ def usual_hysteresis_m(scenario: Scenario) -> float:
     return 0.0 if free else RADII * scenario.radius_m
 
 
-informed = partial(Nearest, order="information")
+informed: Callable[..., Nearest] = partial(Nearest, order="information")

@@ -15,6 +15,7 @@ from wsn_env.envs.actions import MENU_MEMBERS, MenuAction
 from wsn_env.envs.rewards import belief_cost
 from wsn_env.evaluation.policies import Policy
 from wsn_env.evaluation.rollout import rollout
+from wsn_env.models.measurement.base import Order
 from wsn_env.models.quantity import check_quantity
 from wsn_env.models.state import Cluster, State
 from wsn_env.simulation.view import View
@@ -53,9 +54,9 @@ class Planner(ViewPolicy):
     discount: float = 1.0  # a period
     particles: int | None = None  # of the imagined filter; 0: it is Gaussian; None: 0 where it can read the reports
     rule: Policy | None = None  # None: the fixed size, see `Nearest`, that rehearsals found best for the row's lam
-    order: str | None = None  # of merit; None: nearest for positions and bits, information for strengths
+    order: Order | None = None  # of merit; None: nearest for positions and bits, information for strengths
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.scenario.measurement.lasting_errors:
             kind = type(self.scenario.measurement).__name__
             raise ValueError(f"Scenario.measurement = {kind}: planner cannot draw errors that last; allowed are others")
@@ -66,7 +67,7 @@ class Planner(ViewPolicy):
         check_quantity("Planner", "particles", self.particles, at_least=0, whole=True, optional=True)
 
     @cached_property
-    def _order(self) -> str:
+    def _order(self) -> Order:
         return self.order or ("information" if self.scenario.measurement.order == "information" else "nearest")
 
     @cached_property

@@ -10,6 +10,7 @@ import json
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Discrete
@@ -17,7 +18,7 @@ from gymnasium.spaces import Discrete
 from wsn_env.agents.base import ViewPolicy
 from wsn_env.envs.interface import Interface, Settings
 from wsn_env.evaluation.files import replacing
-from wsn_env.learning.network import Network
+from wsn_env.learning.network import EntryNetwork, FlatNetwork, Network
 from wsn_env.models.state import Cluster
 from wsn_env.simulation.view import View
 
@@ -32,18 +33,18 @@ class PPOPolicy(ViewPolicy):
 
     path: str = ""
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         """Tells it from others by what it has learned."""
         weights = b"".join(array.tobytes() for array in self._parts[1].arrays.values())
         return f"PPOPolicy({self.path!r}, weights {hashlib.sha256(weights).hexdigest()[:16]})"
 
-    def __getstate__(self):
+    def __getstate__(self) -> dict[str, Any]:
         """It takes its network along to machines that lack the file."""
         assert self._parts
         return self.__dict__
 
     @cached_property
-    def _parts(self) -> tuple[Interface, Network]:
+    def _parts(self) -> tuple[Interface, FlatNetwork | EntryNetwork]:
         path = Path(self.path or PRETRAINED / self.scenario.name / "policy.json")
         if not self.path and not path.exists():
             shipped = ", ".join(sorted(folder.name for folder in PRETRAINED.iterdir() if folder.is_dir()))
@@ -74,12 +75,12 @@ class PPOPolicy(ViewPolicy):
         return interface.action.cluster(best.reshape(len(best), *interface.action.space.shape), view)
 
 
-def _choices(space) -> list[int]:
+def _choices(space: Any) -> list[int]:
     """How many logits each component of an action has."""
     return [space.n] if isinstance(space, Discrete) else list(space.nvec)
 
 
-def save_policy(folder: str | Path, network: Network, settings: Settings, facts: dict) -> Path:
+def save_policy(folder: str | Path, network: Network, settings: Settings, facts: dict[str, Any]) -> Path:
     """Write policy.safetensors and policy.json; the latter last, so that a policy.json always has its network.
 
     Args:

@@ -29,7 +29,7 @@ class PreDC(ViewPolicy):
     phi0_m: float = 2.0  # Phi0: prediction sd from which the cluster is formed anew [m]
     sees_lam = False
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         check_quantity("PreDC", "theta", self.theta, at_least=0, at_most=1)
         check_quantity("PreDC", "keep_theta", self.keep_theta, at_least=0, at_most=1, optional=True)
         check_quantity("PreDC", "phi0_m", self.phi0_m, at_least=0)
@@ -39,14 +39,14 @@ class PreDC(ViewPolicy):
         p = self.detection(view)
         keep_theta = self.theta if self.keep_theta is None else self.keep_theta
         standing = joint_detection_probability(np.where(view.member, p, 0.0))
-        keep = (view.spread_m < self.phi0_m) & (standing >= keep_theta) & (view.head >= 0)
+        keep = np.asarray((view.spread_m < self.phi0_m) & (standing >= keep_theta) & (view.head >= 0))
         head, chosen = self._form(view, p)
         return Cluster.of(np.where(keep, view.head, head), np.where(keep[:, None], view.member, chosen))
 
     def _form(self, view: View, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Heads (B,) and members (B, S) of new clusters."""
         able = view.battery >= self._head_energy_j(p)[:, None]
-        able = np.where(able.any(axis=1)[:, None], able, view.alive)
+        able = np.where(np.any(able, axis=1, keepdims=True), able, view.alive)
         head = np.where(able.any(axis=1), np.where(able, view.distance, np.inf).argmin(axis=1), -1)
 
         # Nearest first is by probability first; the head goes before all.

@@ -23,7 +23,7 @@ class Random(ViewPolicy):
     n: int | None = None
     sees_lam = False
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         check_quantity("Random", "n", self.n, at_least=0, whole=True, optional=True)
 
     def act(self, view: View) -> Cluster:

@@ -20,7 +20,7 @@ class Strongest(ViewPolicy):
     n: int = 2
     sees_lam = False
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         check_quantity("Strongest", "n", self.n, at_least=0, whole=True)
 
     def act(self, view: View) -> Cluster:

@@ -30,7 +30,7 @@ class StrongestSignal(ViewPolicy):
     hop_m: float | None = None  # None: the modem's; the sensing radius where the radio has no limit
     sees_lam = False
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         check_quantity("StrongestSignal", "hysteresis_db", self.hysteresis_db, at_least=0)
         check_quantity("StrongestSignal", "hop_m", self.hop_m, above=0, optional=True)
 

@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from wsn_env.scenario import Scenario
 
 TABLE = Path(__file__).with_name("tuned.json")
 
 
-def tuned(scenario: Scenario, rule: str) -> dict | None:
+def tuned(scenario: Scenario, rule: str) -> Any:
     """What was found best for a rule in the scenario of this name; None: nothing was tuned."""
     return _table().get(scenario.name, {}).get(rule)
 
 
-def nearest_lam(lams: Sequence[float], lam: np.ndarray) -> np.ndarray:
+def nearest_lam(lams: npt.ArrayLike, lam: npt.ArrayLike) -> np.ndarray:
     """(B,) which of `lams` is nearest to each `lam`, on the logarithmic scale; the smaller wins a tie."""
     logs, log = (np.log(np.maximum(np.asarray(values, dtype=float), 1e-9)) for values in (lams, lam))
     return abs(log[:, None] - logs).argmin(axis=1)
 
 
 @cache
-def _table() -> dict:
+def _table() -> dict[str, Any]:
     return json.loads(TABLE.read_text())["scenarios"]

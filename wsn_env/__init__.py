@@ -6,8 +6,23 @@ envs = gym.make_vec("wsn_env/PreDC-v0", num_envs=64, vectorization_mode="vector_
 """
 
 import importlib
+from typing import TYPE_CHECKING, Any
 
 from wsn_env.envs.registration import register_envs
+
+if TYPE_CHECKING:
+    from wsn_env.envs.env import ClusterEnv as ClusterEnv
+    from wsn_env.envs.vector_env import ClusterVectorEnv as ClusterVectorEnv
+    from wsn_env.evaluation.comparison import evaluate as evaluate
+    from wsn_env.evaluation.policies import make_policy as make_policy
+    from wsn_env.evaluation.scoring import score as score
+    from wsn_env.models.quantity import ScenarioError as ScenarioError
+    from wsn_env.models.state import Cluster as Cluster
+    from wsn_env.models.state import Outcome as Outcome
+    from wsn_env.models.state import State as State
+    from wsn_env.scenario import Scenario as Scenario
+    from wsn_env.simulation.view import View as View
+    from wsn_env.simulation.world import World as World
 
 __version__ = "0.1.0"
 
@@ -29,14 +44,14 @@ _HOMES = {
 __all__ = ["__version__", *_HOMES]
 
 
-def __getattr__(name: str):
+def __getattr__(name: str) -> Any:
     """Load the public names when they are first used, so that importing the package stays cheap (PEP 562)."""
     if name in _HOMES:
         return getattr(importlib.import_module(_HOMES[name]), name)
     raise AttributeError(f"module 'wsn_env' has no attribute {name!r}")
 
 
-def __dir__():
+def __dir__() -> list[str]:
     return sorted(__all__)
 
 

@@ -25,13 +25,13 @@ from wsn_env.models.quantity import ScenarioError, check_quantity, suggest
 KIND, VERSION = "wsn_env calibration", 1
 
 # What a scenario takes: each quantity's meaning and bounds; lists hold one figure a receiver.
-LISTS: dict[str, tuple[str, dict[str, float]]] = {
+LISTS: dict[str, tuple[str, dict[str, Any]]] = {
     "positions": ("x and y of the receivers [m]", {}),
     "heights_m": ("heights of the receivers [m]", {}),
     "at_1m_db": ("level at 1 m (P0) [dBm]", {}),
     "exponents": ("path loss exponents (n)", dict(above=0)),
 }
-NUMBERS: dict[str, tuple[str, dict[str, float]]] = {
+NUMBERS: dict[str, tuple[str, dict[str, Any]]] = {
     "side_m": ("width of the room, along x", dict(above=0)),
     "depth_m": ("depth of the room, along y", dict(above=0)),
     "beacon_m": ("mean height of the beacon", {}),

@@ -7,11 +7,13 @@ of their addresses and shapes, `state.handle`, and begins with `state = state_at
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
+import numpy.typing as npt
 from llvmlite import ir
 from llvmlite.ir import Constant
 from numba import config, from_dtype, types
@@ -20,7 +22,7 @@ from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, overload, register_model
 
 
-class _Row(np.record):
+class _Row(np.record):  # type: ignore[misc]  # final in NumPy's stubs alone
     """An element whose fields read as attributes in Python, too, whatever they are called: `row.mean` is a field."""
 
     def __getattribute__(self, name):
@@ -29,13 +31,13 @@ class _Row(np.record):
         return super().__getattribute__(name)
 
 
-def record(members: list) -> np.dtype:
+def record(members: list[Any]) -> np.dtype[np.void]:
     """A structured type whose fields kernels read as attributes."""
     made = np.dtype(members, align=True)
     return np.dtype((_Row, made)) if config.DISABLE_JIT else made
 
 
-def array(dtype, *axes: str | int) -> Any:
+def array(dtype: npt.DTypeLike, *axes: str | int) -> Any:
     """A field of a record of arrays.
 
     Args:
@@ -71,11 +73,11 @@ class Arrays:
                 made.append(np.zeros(shape, about["dtype"]))
         return cls(*made)
 
-    def parts(self) -> tuple:
+    def parts(self) -> tuple[Any, ...]:
         """The fields, in order."""
         return tuple(getattr(self, item.name) for item in fields(self))
 
-    def map(self, change) -> Self:
+    def map(self, change: Callable[[np.ndarray], np.ndarray]) -> Self:
         """The same record with every array changed."""
         return type(self)(*(each.map(change) if isinstance(each, Arrays) else change(each) for each in self.parts()))
 
@@ -94,7 +96,7 @@ class Arrays:
         return found
 
     @cached_property
-    def handle(self):
+    def handle(self) -> Any:
         """What kernels take: (n,) int64, address and shape of each array. The arrays must outlive the call."""
         if config.DISABLE_JIT:
             return self
@@ -108,7 +110,7 @@ class Arrays:
             words += leaf.__array_interface__["data"][0], *leaf.shape
         return np.array(words, np.int64)
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Any, ...]:
         return type(self), self.parts()  # an address holds in one process, for one record
 
     def __getattr__(self, name: str) -> np.ndarray:
@@ -154,14 +156,14 @@ class _AddressModel(models.PrimitiveModel):
         super().__init__(dmm, fe_type, WORD)
 
 
-WORD = ir.IntType(64)
+WORD: Any = ir.IntType(64)
 
 _known: dict[type[Arrays], Any] = {}  # the compiled type of each class
 
 
 def _compiled_type(cls: type[Arrays]) -> Any:
     if cls not in _known:
-        own = type(f"{cls.__name__}ByAddress", (_ByAddress,), {"places": {}})
+        own: Any = type(f"{cls.__name__}ByAddress", (_ByAddress,), {"places": {}})
         register_model(own)(_AddressModel)
         place = 0
         for item in fields(cls):
@@ -202,7 +204,8 @@ def _array_at(context, builder, kind, address, lengths):
     """A C-contiguous array that owns nothing."""
     made = context.make_array(kind)(context, builder)
     itemsize = WORD(context.get_abi_sizeof(context.get_data_type(kind.dtype)))
-    steps, stride = [], itemsize
+    steps: list[Any] = []
+    stride = itemsize
     for length in reversed(lengths):
         steps.insert(0, stride)
         stride = builder.mul(stride, length, flags=["nsw"])
@@ -216,7 +219,7 @@ def _array_at(context, builder, kind, address, lengths):
     return made._getvalue()
 
 
-def opener(cls: type[Arrays]):
+def opener(cls: type[Arrays]) -> Any:
     """A function for kernels: the record of a handle.
 
     Args:
@@ -235,10 +238,12 @@ def opener(cls: type[Arrays]):
     def record_at(handle):
         return handle
 
+    named: Any = record_at
+
     @overload(record_at)
     def _(handle):
         return lambda handle: address_of(handle)
 
-    record_at.__qualname__ = f"{cls.__name__}_at"
-    record_at.__kernel_layout__ = repr(_layout(cls))  # type: ignore[attr-defined]  # counts in stamps
-    return record_at
+    named.__qualname__ = f"{cls.__name__}_at"
+    named.__kernel_layout__ = repr(_layout(cls))  # counts in stamps
+    return named

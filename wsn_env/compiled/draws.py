@@ -8,6 +8,8 @@ start that is one hash of the stream, and a second, independent hash enters betw
 streams whose counters happen to overlap still give unrelated numbers.
 """
 
+from typing import Any
+
 import numpy as np
 from numba import int32, uint64
 
@@ -34,7 +36,7 @@ def key_of_seed(seed: int) -> np.uint64:
 
 
 @piece
-def mix(z):
+def mix(z: Any) -> Any:
     """SplitMix64's finaliser: a bijection of 64 bits."""
     z = (z ^ (z >> uint64(30))) * MIX_1
     z = (z ^ (z >> uint64(27))) * MIX_2
@@ -42,14 +44,14 @@ def mix(z):
 
 
 @piece
-def stream(key, period, purpose):
+def stream(key: Any, period: int, purpose: int) -> tuple[Any, ...]:
     """The two 64-bit halves of a stream's key."""
     a = mix(mix(key + GOLDEN) ^ (uint64(period) * uint64(0xD1342543DE82EF95) + uint64(purpose) * GOLDEN))
     return a, mix(a ^ uint64(0x5851F42D4C957F2D))
 
 
 @piece
-def bits(stream, index):
+def bits(stream: Any, index: int) -> Any:
     """64 random bits: number `index` of a stream."""
     start, inner = stream
     z = start + uint64(index) * GOLDEN
@@ -59,13 +61,13 @@ def bits(stream, index):
 
 
 @piece
-def uniform(stream, index):
+def uniform(stream: Any, index: int) -> float:
     """U[0, 1) with 53 bits."""
     return np.float64(bits(stream, index) >> uint64(11)) * 1.1102230246251565e-16
 
 
 @piece
-def normal_pair(stream, index):
+def normal_pair(stream: Any, index: int) -> tuple[float, float]:
     """Two independent N(0, 1) doubles, by Box and Muller's transform of draws 2 index and 2 index + 1."""
     radius = np.sqrt(-2.0 * log(uniform(stream, 2 * index) + 5.551115123125783e-17))
     s, c = sincos(4.0 * HALF_PI * uniform(stream, 2 * index + 1))
@@ -73,7 +75,7 @@ def normal_pair(stream, index):
 
 
 @piece
-def normal_pair32(h):
+def normal_pair32(h: Any) -> tuple[Any, ...]:
     """Two independent N(0, 1) float32 from 64 random bits, without a branch: 24 bits give the radius (so |z| < 5.9),
     24 the angle within a quadrant, two the quadrant."""
     low = int32(h & uint64(0xFFFFFF))
@@ -103,7 +105,7 @@ def _uniform_rows(seeds, out):
             out[b, i] = uniform(s, i)
 
 
-def uniforms(seeds, count: int) -> np.ndarray:
+def uniforms(seeds: Any, count: int) -> np.ndarray:
     """U[0, 1) numbers for policies: (B, count) from the view's luck (B,), alike in every batch."""
     out = np.empty((len(seeds), count))
     _uniform_rows(np.ascontiguousarray(seeds, dtype=np.uint32), out)

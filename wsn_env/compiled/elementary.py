@@ -6,6 +6,8 @@ minimax coefficients of Sun's fdlibm (errors below 2 ulp); the float32 ones are 
 that the compiler can turn them into vector instructions (relative errors below 2e-7).
 """
 
+from typing import Any
+
 import numpy as np
 from llvmlite import ir
 from numba import config, types
@@ -51,7 +53,7 @@ ERFC = (
 )
 
 
-def _bitcast(source, target, llvm_type):
+def _bitcast(source: Any, target: Any, llvm_type: Any) -> Any:
     if config.DISABLE_JIT:
         return lambda value: getattr(np, source.name)(value).view(getattr(np, target.name))
 
@@ -65,14 +67,14 @@ def _bitcast(source, target, llvm_type):
     return cast
 
 
-f32_bits = _bitcast(types.float32, types.int32, ir.IntType(32))
-f32_from_bits = _bitcast(types.int32, types.float32, ir.FloatType())
-f64_bits = _bitcast(types.float64, types.int64, ir.IntType(64))
-f64_from_bits = _bitcast(types.int64, types.float64, ir.DoubleType())
+f32_bits: Any = _bitcast(types.float32, types.int32, ir.IntType(32))
+f32_from_bits: Any = _bitcast(types.int32, types.float32, ir.FloatType())
+f64_bits: Any = _bitcast(types.float64, types.int64, ir.IntType(64))
+f64_from_bits: Any = _bitcast(types.int64, types.float64, ir.DoubleType())
 
 
 @piece
-def log(x):
+def log(x: Any) -> float:
     """Natural logarithm of a positive normal double."""
     bits = f64_bits(x)
     exponent = (bits - 0x3FE6A09E667F3BCD) >> 52  # so that the mantissa lies in [sqrt(1/2), sqrt(2))
@@ -100,7 +102,7 @@ def log(x):
 
 
 @piece
-def exp(x):
+def exp(x: Any) -> float:
     """e**x for doubles; 0 below -708, clamped at +709."""
     if x < -708.0:
         return 0.0
@@ -124,7 +126,7 @@ def exp(x):
 
 
 @piece
-def sincos(x):
+def sincos(x: Any) -> tuple[float, float]:
     """(sin x, cos x) for |x| < 1e5 rad."""
     n = np.floor(x / HALF_PI + 0.5)
     r = (x - n * 1.57079632673412561417e00) - n * 6.07710050650619224932e-11
@@ -164,7 +166,7 @@ def sincos(x):
 
 
 @piece
-def log32(x):
+def log32(x: Any) -> Any:
     """Natural logarithm of a positive normal float32."""
     bits = f32_bits(x)
     exponent = I32(I32(bits - I32(0x3F3504F3)) >> I32(23))
@@ -183,14 +185,14 @@ def log32(x):
 
 
 @piece
-def exp32(x):
+def exp32(x: Any) -> Any:
     """e**x for float32 x <= 0; clamped at 2**-126, never 0."""
     rest, power = _exp32_parts(x)
     return (rest + F(1)) * power
 
 
 @piece
-def expm1_32(x):
+def expm1_32(x: Any) -> Any:
     """e**x - 1 for float32 x <= 0, without loss near 0 (relative error below 3e-7)."""
     rest, power = _exp32_parts(x)
     return rest * power + (power - F(1))
@@ -212,7 +214,7 @@ def _exp32_parts(x):
 
 
 @piece
-def tanh32(x):
+def tanh32(x: Any) -> Any:
     """Hyperbolic tangent of a float32 (absolute error below 2e-7)."""
     e = exp32(F(-2) * abs(x))
     y = (F(1) - e) / (F(1) + e)
@@ -220,7 +222,7 @@ def tanh32(x):
 
 
 @piece
-def normal_cdf(x):
+def normal_cdf(x: Any) -> float:
     """Phi(x), the standard normal distribution function (relative error below 1e-12, 0 below -37.6)."""
     z = ROOT_HALF * abs(x)
     t = 2.0 / (2.0 + z)
@@ -232,7 +234,7 @@ def normal_cdf(x):
 
 
 @inline_piece
-def log_normal_cdf32(x):
+def log_normal_cdf32(x: Any) -> Any:
     """ln Phi(x) for float32, finite and at most 0 (absolute error below 2e-7 + 4e-7 |ln Phi|).
 
     Without a branch; ERFC's polynomial to degree 11.
@@ -258,7 +260,7 @@ def log_normal_cdf32(x):
 
 
 @lean_piece
-def expected_error(p00, p01, p11):
+def expected_error(p00: float, p01: float, p11: float) -> float:
     """Mean length of a normal vector of two dimensions with this covariance (relative error below 2e-3).
 
     It is sqrt(2 a / pi) E(1 - b / a), with the complete elliptic integral E and the variances a >= b along the axes:
@@ -270,7 +272,7 @@ def expected_error(p00, p01, p11):
 
 
 @inline_piece
-def cos_turns32(t):
+def cos_turns32(t: Any) -> Any:
     """cos(2 pi t) in float32, by its series about 0 after taking off whole turns (absolute error below 2e-6)."""
     t -= np.floor(t + F(0.5))
     u = t * t

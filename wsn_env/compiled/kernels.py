@@ -13,14 +13,18 @@ from __future__ import annotations
 
 import functools
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from types import FunctionType
+from typing import Any, TypeVar
 
 import numba
 import numpy as np
 from numba.core.options import DefaultOptions
 
 from wsn_env.compiled import store
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 SERIAL_ROWS = 8  # up to here one thread is faster than handing work out
 
@@ -34,7 +38,7 @@ FAST_MODULES = (  # the filter; the world stays strict
 )
 
 
-def _options(**wanted) -> dict:
+def _options(**wanted: Any) -> dict[str, Any]:
     """Options of njit; without those that this Numba does not know."""
     # fastmath=False is said aloud: a piece that says nothing takes over what its first caller has.
     wanted["no_cfunc_wrapper"] = True  # for C's callbacks; a tenth of the time of compiling
@@ -45,21 +49,21 @@ def _options(**wanted) -> dict:
 _COUNTING, _LEAN = _options(_nrt=True), _options(_nrt=False)
 
 
-def _compile(function, options: dict):
+def _compile(function: F, options: dict[str, Any]) -> F:
     return function if numba.config.DISABLE_JIT else numba.jit(**options)(function)
 
 
-def piece(function):
+def piece(function: F) -> F:
     """Compile a function for kernels to call."""
     return _compile(function, _COUNTING)
 
 
-def inline_piece(function):
+def inline_piece(function: F) -> F:
     """A piece that is copied into whoever calls it: for long loops."""
     return _compile(function, _COUNTING | _options(forceinline=True))
 
 
-def lean_piece(function):
+def lean_piece(function: F) -> F:
     """A piece that allocates nothing."""
     return _compile(function, _LEAN)
 
@@ -71,22 +75,23 @@ class Kernel:
     of kinds, and each has a place of its own on disk: two processes never write to one place about different kinds.
     """
 
-    def __init__(self, function: FunctionType, options: dict):
+    def __init__(self, function: FunctionType, options: dict[str, Any]) -> None:
         functools.update_wrapper(self, function)
-        self.py_func, self.targetoptions = function, options
+        self.py_func: FunctionType = function
+        self.targetoptions: dict[str, Any] = options
         names = function.__code__.co_varnames[: function.__code__.co_argcount]
         self._place = names.index("cs") if "cs" in names else -1
-        self._made: dict[int, tuple] = {}  # by the type's identity: the compiled function, and the type
-        self.call = self._by_kind if self._place >= 0 else self._first
+        self._made: dict[int, tuple[Any, np.dtype]] = {}  # by the type's identity: the compiled function, and the type
+        self.call: Callable[..., Any] = self._by_kind if self._place >= 0 else self._first
 
-    def __call__(self, *arguments):
+    def __call__(self, *arguments: Any) -> Any:
         return self.call(*arguments)
 
-    def _by_kind(self, *arguments):
+    def _by_kind(self, *arguments: Any) -> Any:
         made = self._made.get(id(arguments[self._place].dtype))
         return made[0](*arguments) if made else self._first(*arguments)
 
-    def _first(self, *arguments):
+    def _first(self, *arguments: Any) -> Any:
         if numba.config.DISABLE_JIT:
             self.call = np.errstate(over="ignore")(self.py_func)  # random bits wrap around
             return self.call(*arguments)
@@ -102,22 +107,22 @@ class Kernel:
         self._made[id(kinds)] = made, kinds
         return result
 
-    def __reduce__(self):
-        return self.__qualname__  # of its module: pickled by name, as functions are
+    def __reduce__(self) -> str:
+        return vars(self)["__qualname__"]  # of its module: pickled by name, as functions are
 
 
-def kernel(function):
+def kernel(function: Any) -> Kernel:
     """Compile a function for Python to call, cached on disk."""
     return Kernel(function, _COUNTING)
 
 
-def lean_kernel(function):
+def lean_kernel(function: Any) -> Kernel:
     """A kernel of lean pieces only."""
     return Kernel(function, _LEAN)
 
 
 @functools.cache
-def fast(compiled):
+def fast(compiled: Any) -> Any:
     """The twin of a kernel or piece whose sums and products the compiler may regroup and fuse.
 
     Its results agree to rounding, but differ from processor to processor. The pieces that the function names get a
@@ -136,7 +141,7 @@ def fast(compiled):
     return Kernel(twin, options) if isinstance(compiled, Kernel) else numba.jit(**options)(twin)
 
 
-def _has_twin(value) -> bool:
+def _has_twin(value: Any) -> bool:
     function = getattr(value, "py_func", None)
     return function is not None and not isinstance(value, Kernel) and function.__module__ in FAST_MODULES
 
@@ -146,7 +151,7 @@ if hasattr(os, "register_at_fork"):  # not on Windows
     os.register_at_fork(after_in_child=_pools.clear)  # a child has none of its parent's threads
 
 
-def over_rows(kernel, rows: int, threads: int, *arguments) -> int:
+def over_rows(kernel: Any, rows: int, threads: int, *arguments: Any) -> int:
     """Call kernel(start, stop, *arguments) over 0..rows, shared among threads.
 
     Args:
@@ -166,7 +171,7 @@ def over_rows(kernel, rows: int, threads: int, *arguments) -> int:
     return own + sum(job.result() or 0 for job in others)
 
 
-def threads_for(marked, threads: int) -> int:
+def threads_for(marked: np.ndarray, threads: int) -> int:
     """How many threads serve a kernel that works in the marked rows (B,) only: waking them for a few takes longer."""
     return threads if np.count_nonzero(marked) > SERIAL_ROWS else 1
 

@@ -11,6 +11,7 @@ import inspect
 from collections.abc import Iterator
 from functools import cache
 from types import CodeType, FunctionType, ModuleType
+from typing import Any
 
 import numba
 import numpy as np
@@ -18,15 +19,15 @@ import numpy as np
 DIGITS = 16  # of a stamp
 
 
-def stamp(*functions, more: object = "") -> str:
+def stamp(*functions: Any, more: object = "") -> str:
     """Hexadecimal digest of some functions and of all that they reach, alike in every process.
 
     Args:
         functions: Python's or Numba's.
         more: anything else whose repr counts.
     """
-    reached: dict[object, str] = {}
-    waiting = [plain_function(function) for function in functions]
+    reached: dict[Any, str] = {}
+    waiting: list[Any] = [plain_function(function) for function in functions]
     while waiting:
         function = waiting.pop()
         if function not in reached:
@@ -38,13 +39,13 @@ def stamp(*functions, more: object = "") -> str:
     return hashlib.sha256(whole.encode()).hexdigest()[:DIGITS]
 
 
-def options_text(options: dict) -> str:
+def options_text(options: dict[str, Any]) -> str:
     """Options of compilation, alike in every process."""
     plain = {name: sorted(value) if isinstance(value, (set, frozenset)) else value for name, value in options.items()}
     return repr(sorted(plain.items()))
 
 
-def plain_function(value) -> FunctionType | None:
+def plain_function(value: Any) -> FunctionType | None:
     """The Python function behind a compiled one, an intrinsic or a method; None: there is none."""
     for name in ("py_func", "__func__", "__wrapped__"):
         value = getattr(value, name, value)

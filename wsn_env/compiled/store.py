@@ -23,6 +23,7 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from types import FunctionType
+from typing import Any
 
 import numba
 import numpy as np
@@ -55,7 +56,9 @@ def store_folder() -> Path:
     return home / "wsn_env" / "kernels"
 
 
-def open_kernel(function: FunctionType, options: dict, arguments: tuple, kinds: np.dtype | None = None):
+def open_kernel(
+    function: FunctionType, options: dict[str, Any], arguments: tuple[Any, ...], kinds: np.dtype | None = None
+) -> tuple[Any, Any]:
     """The compiled function, from the store if it is there, and what it returns for these arguments.
 
     Args:
@@ -105,7 +108,7 @@ def _alone_in(folder: Path) -> Iterator[None]:
         yield
 
 
-def _without_collecting(dispatcher, arguments: tuple):
+def _without_collecting(dispatcher, arguments: tuple[Any, ...]):
     """A first call. Compiling makes millions of objects; to look for garbage among them takes a tenth of its time."""
     collects = gc.isenabled()
     gc.disable()
@@ -116,7 +119,7 @@ def _without_collecting(dispatcher, arguments: tuple):
             gc.enable()
 
 
-def _dispatcher(function: FunctionType, options: dict, source: Path):
+def _dispatcher(function: FunctionType, options: dict[str, Any], source: Path):
     """Numba's, of the same code, said to stand in the store."""
     code = function.__code__.replace(co_filename=str(source), co_firstlineno=1)
     twin = FunctionType(code, function.__globals__, function.__name__, function.__defaults__, function.__closure__)

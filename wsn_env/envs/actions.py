@@ -3,20 +3,39 @@ ValueError what is not in its space: NumPy's and Gymnasium's own checks would ta
 
 from __future__ import annotations
 
+from typing import Any, Literal, Protocol
+
 import numpy as np
 from gymnasium import spaces
 
 from wsn_env.compiled.kernels import lean_kernel
 from wsn_env.envs.merit import KEEP, NEAREST, ORDERS, fill_chances, rank_row
+from wsn_env.models.measurement.base import Order
 from wsn_env.models.quantity import suggest
 from wsn_env.models.state import KEEP_CLUSTER, Cluster, knowledge_at, sensors_of
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import constants
 from wsn_env.simulation.view import View
 
+ActionName = Literal["menu", "subset", "radius", "scores", "nodes", "cluster"]
+
 MENU_MEMBERS = 8  # the menu's largest number of further members
 GROUP = MENU_MEMBERS + 1  # entries for each rule of who leads: KEEP, BEST, AHEAD
 MENU_ENTRIES = 1 + 3 * GROUP
+
+
+class Action(Protocol):
+    """What every one has; each space is of one environment."""
+
+    space: Any  # the class's own, of Gymnasium
+
+    def cluster(self, action: Any, view: View) -> Cluster:
+        """The cluster that the actions (B, ...) name."""
+        ...
+
+    def masks(self, view: View) -> np.ndarray:
+        """(B, n) bool: which entries of each component make sense now."""
+        ...
 
 
 class MenuAction:
@@ -24,14 +43,14 @@ class MenuAction:
     node nearest to a point 0.3 sensing radii ahead of the prediction; each with the n best further members, n = 0..8.
     Without a living head, keeping it means moving it to the best."""
 
-    def __init__(self, scenario: Scenario, order: str, candidates: int):
+    def __init__(self, scenario: Scenario, order: Order, candidates: int) -> None:
         if candidates <= MENU_MEMBERS:
             raise ValueError(f"candidates = {candidates}: the menu needs at least {MENU_MEMBERS + 1}")
-        self.space = spaces.Discrete(MENU_ENTRIES)
+        self.space: spaces.Discrete = spaces.Discrete(MENU_ENTRIES)
         self._by, self._candidates, self._ring_m = ORDERS.index(order), candidates, scenario.ring_m
         self._constants = constants(scenario)
 
-    def cluster(self, action, view: View) -> Cluster:
+    def cluster(self, action: Any, view: View) -> Cluster:
         """The cluster that the menu's entries name."""
         rows = len(view.row)
         actions = np.ascontiguousarray(_whole_numbers(action, self.space, rows), np.int64)
@@ -91,11 +110,11 @@ def _read_menu(start, stop, cs, by, actions, nodes, handle, scratch, ordered, he
 class SubsetAction:
     """MultiDiscrete [K + 1] + [2] * K: the head (0: keep it, j: the j-th nearest); which of the K nearest are in."""
 
-    def __init__(self, scenario: Scenario, order: str, candidates: int):
-        self.space = spaces.MultiDiscrete([candidates + 1] + [2] * candidates)
+    def __init__(self, scenario: Scenario, order: Order, candidates: int) -> None:
+        self.space: spaces.MultiDiscrete = spaces.MultiDiscrete([candidates + 1] + [2] * candidates)
         self._candidates, self._ring_m = candidates, scenario.ring_m
 
-    def cluster(self, action, view: View) -> Cluster:
+    def cluster(self, action: Any, view: View) -> Cluster:
         """The cluster that the entries name."""
         action = _in_range(action, self.space, len(view.row))
         nodes = view.nearest(self._candidates, self._ring_m)[0]
@@ -117,11 +136,11 @@ class RadiusAction:
 
     NEAR = 0.8
 
-    def __init__(self, scenario: Scenario, order: str, candidates: int):
-        self.space = spaces.Box(0.0, 1.0, (1,), np.float32)
+    def __init__(self, scenario: Scenario, order: Order, candidates: int) -> None:
+        self.space: spaces.Box = spaces.Box(0.0, 1.0, (1,), np.float32)
         self._candidates, self._radius_m = candidates, scenario.radius_m
 
-    def cluster(self, action, view: View) -> Cluster:
+    def cluster(self, action: Any, view: View) -> Cluster:
         """The nodes within the radius."""
         action = _in_box(action, self.space, len(view.row))
         nodes, distances = view.nearest(self._candidates)
@@ -139,11 +158,11 @@ class RadiusAction:
 class ScoresAction:
     """Box(K) in [-1, 1]: of the K nearest candidates those above 0 are members and the highest is the head."""
 
-    def __init__(self, scenario: Scenario, order: str, candidates: int):
-        self.space = spaces.Box(-1.0, 1.0, (candidates,), np.float32)
+    def __init__(self, scenario: Scenario, order: Order, candidates: int) -> None:
+        self.space: spaces.Box = spaces.Box(-1.0, 1.0, (candidates,), np.float32)
         self._candidates, self._ring_m = candidates, scenario.ring_m
 
-    def cluster(self, action, view: View) -> Cluster:
+    def cluster(self, action: Any, view: View) -> Cluster:
         """The cluster that the scores name."""
         action = _in_box(action, self.space, len(view.row))
         nodes = view.nearest(self._candidates, self._ring_m)[0]
@@ -159,10 +178,10 @@ class NodesAction:
     """MultiDiscrete([2] * S): who is awake. The head is the chosen node nearest to the prediction; if none is chosen,
     the living node nearest to it, alone."""
 
-    def __init__(self, scenario: Scenario, order: str, candidates: int):
-        self.space = spaces.MultiDiscrete([2] * scenario.field.nodes)
+    def __init__(self, scenario: Scenario, order: Order, candidates: int) -> None:
+        self.space: spaces.MultiDiscrete = spaces.MultiDiscrete([2] * scenario.field.nodes)
 
-    def cluster(self, action, view: View) -> Cluster:
+    def cluster(self, action: Any, view: View) -> Cluster:
         """The cluster of the chosen nodes."""
         chosen = _in_range(action, self.space, len(view.row)) == 1
         living = chosen & view.alive
@@ -178,11 +197,13 @@ class NodesAction:
 class ClusterAction:
     """Dict(head: Discrete(S), members: MultiDiscrete([2] * S)): the full choice."""
 
-    def __init__(self, scenario: Scenario, order: str, candidates: int):
+    def __init__(self, scenario: Scenario, order: Order, candidates: int) -> None:
         nodes = scenario.field.nodes
-        self.space = spaces.Dict({"head": spaces.Discrete(nodes), "members": spaces.MultiDiscrete([2] * nodes)})
+        self.space: spaces.Dict = spaces.Dict(
+            {"head": spaces.Discrete(nodes), "members": spaces.MultiDiscrete([2] * nodes)}
+        )
 
-    def cluster(self, action, view: View) -> Cluster:
+    def cluster(self, action: Any, view: View) -> Cluster:
         """The choice itself."""
         if not isinstance(action, dict) or action.keys() != self.space.spaces.keys():
             raise _refusal(action, self.space)
@@ -195,7 +216,7 @@ class ClusterAction:
         return np.concatenate([view.alive, choice], axis=1)
 
 
-def _whole_numbers(action, space, rows: int) -> np.ndarray:
+def _whole_numbers(action: Any, space: Any, rows: int) -> np.ndarray:
     """The actions as an array (rows, ...) of integers."""
     array = np.asarray(action)
     if array.dtype.kind not in "iu" or array.shape != (rows, *space.shape):
@@ -203,7 +224,7 @@ def _whole_numbers(action, space, rows: int) -> np.ndarray:
     return array
 
 
-def _in_range(action, space, rows: int) -> np.ndarray:
+def _in_range(action: Any, space: Any, rows: int) -> np.ndarray:
     """The actions as an array, if they are in the space."""
     array = _whole_numbers(action, space, rows)
     most = space.n - 1 if isinstance(space, spaces.Discrete) else space.nvec - 1
@@ -212,7 +233,7 @@ def _in_range(action, space, rows: int) -> np.ndarray:
     return array
 
 
-def _in_box(action, space, rows: int) -> np.ndarray:
+def _in_box(action: Any, space: Any, rows: int) -> np.ndarray:
     """The actions as an array (rows, ...), if they are in the space."""
     array = np.asarray(action)
     if array.dtype.kind not in "fiu" or array.shape != (rows, *space.shape):
@@ -222,11 +243,11 @@ def _in_box(action, space, rows: int) -> np.ndarray:
     return array
 
 
-def _refusal(action, space) -> ValueError:
+def _refusal(action: Any, space: Any) -> ValueError:
     return ValueError(f"action {action!r} is not in {space}, one for each row")
 
 
-ACTIONS = {
+ACTIONS: dict[str, Any] = {
     "menu": MenuAction,
     "subset": SubsetAction,
     "radius": RadiusAction,
@@ -236,7 +257,7 @@ ACTIONS = {
 }
 
 
-def make_action(name: str, scenario: Scenario, order: str, candidates: int):
+def make_action(name: ActionName, scenario: Scenario, order: Order, candidates: int) -> Action:
     """An action by name.
 
     Raises:

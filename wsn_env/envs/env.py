@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Unpack
 
 import gymnasium as gym
 import numpy as np
 
 from wsn_env.compiled import draws
+from wsn_env.envs.actions import ActionName
 from wsn_env.envs.interface import Interface, Settings
-from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera
+from wsn_env.envs.observations import ObservationName
+from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera, RenderMode
+from wsn_env.envs.rewards import RewardName
+from wsn_env.models.measurement.base import Order
 from wsn_env.models.state import OUTCOME, Outcome, State
 from wsn_env.scenario import Scenario
+from wsn_env.scenario.quantities import Quantities
 from wsn_env.simulation.bound import Bound, bound_kind
 from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World
+
+_OUTCOMES = OUTCOME.names or ()
 
 
 class ClusterEnv(gym.Env):
@@ -37,38 +44,39 @@ class ClusterEnv(gym.Env):
     An episode is truncated at the horizon and never terminates: a lost track or a dead network goes on.
     """
 
-    metadata = {"render_modes": list(RENDER_MODES), "render_fps": FPS}
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": FPS}
 
     def __init__(
         self,
         scenario: str | Scenario = "PreDC-v0",
-        action: str = "menu",
-        observation: str = "candidates",
-        reward: str = "error",
-        order: str = "nearest",
+        action: ActionName = "menu",
+        observation: ObservationName = "candidates",
+        reward: RewardName = "error",
+        order: Order = "nearest",
         candidates: int = Settings.candidates,
-        render_mode: str | None = None,
+        render_mode: RenderMode | None = None,
         frame_px: int = 600,
         fast: bool = False,
-        **overrides,
-    ):
-        self.scenario = Scenario.of(scenario, **overrides)
+        **overrides: Unpack[Quantities],
+    ) -> None:
+        self.scenario: Scenario = Scenario.of(scenario, **overrides)
         self._camera = None if render_mode is None else Camera(self.scenario, render_mode, frame_px)
-        self.interface = Interface(self.scenario, Settings(action, observation, reward, order, candidates))
-        self.world = World(self.scenario, threads=1, fast=fast)
-        self.render_mode = render_mode
-        self.action_space = self.interface.action.space
-        self.observation_space = self.interface.observation.space
+        self.interface: Interface = Interface(self.scenario, Settings(action, observation, reward, order, candidates))
+        self.world: World = World(self.scenario, threads=1, fast=fast)
+        self.render_mode: RenderMode | None = render_mode
+        self.action_space: gym.Space[Any] = self.interface.action.space
+        self.observation_space: gym.Space[Any] = self.interface.observation.space
         if self.interface.reward_space is not None:
-            self.reward_space, self.reward_dim = self.interface.reward_space, 2
-        self._state: State | None = None
-        self._view: View | None = None
+            self.reward_space: gym.spaces.Box = self.interface.reward_space
+            self.reward_dim: int = 2
+        self._state: State = None  # type: ignore[assignment]  # until the first reset
+        self._view: View = None  # type: ignore[assignment]
         self._lam, self._period = 0.0, 0
         self._squares = 0.0
         self._detections = 0
         self._bound = None if bound_kind(self.scenario) == "none" else Bound(self.scenario)
 
-    def reset(self, *, seed: int | None = None, options: dict | None = None):
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """A new episode: seed fixes field, track and every draw."""
         super().reset(seed=seed)
         state = self.world.allocate(1) if self._state is None else self._state
@@ -85,7 +93,7 @@ class ClusterEnv(gym.Env):
             self._camera.show(self._state)
         return self._observe(), info
 
-    def step(self, action):
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """One period. Returns observation, reward, terminated (never), truncated, info."""
         if self._state is None:
             raise gym.error.ResetNeeded("call reset() before step()")
@@ -114,7 +122,7 @@ class ClusterEnv(gym.Env):
         return self._observe(), reward, False, truncated, info
 
     def _judge(self, outcome: Outcome) -> tuple[float | np.ndarray, dict[str, Any]]:
-        return self.interface.judge(dict(zip(OUTCOME.names, outcome.row.item())), self._lam)
+        return self.interface.judge(dict(zip(_OUTCOMES, outcome.row.item())), self._lam)
 
     @property
     def view(self) -> View:
@@ -127,19 +135,19 @@ class ClusterEnv(gym.Env):
         """Which entries of the action make sense now (flat bool, as sb3-contrib's MaskablePPO wants them)."""
         return self.interface.action.masks(self.view)[0]
 
-    def render(self):
+    def render(self) -> Any:
         """A frame (frame_px, frame_px, 3) uint8 of the present state; in "human" mode None: reset and step show it."""
         if self._camera is None or self._state is None:
             gym.logger.warn("render() needs render_mode='rgb_array' or 'human' and a reset environment")
             return None
         return self._camera.frames(self._state)[0] if self.render_mode == "rgb_array" else None
 
-    def close(self):
+    def close(self) -> None:
         """Close the window, if there is one."""
         if self._camera is not None:
             self._camera.close()
 
-    def _observe(self):
+    def _observe(self) -> Any:
         self._view = View.of(self._state)
         arrays = self.interface.observation.encode(self._view)
         if isinstance(arrays, dict):
@@ -147,5 +155,5 @@ class ClusterEnv(gym.Env):
         return arrays[0]
 
 
-def _batched(action):
+def _batched(action: Any) -> Any:
     return {k: np.asarray(v)[None] for k, v in action.items()} if isinstance(action, dict) else np.asarray(action)[None]

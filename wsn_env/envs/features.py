@@ -1,12 +1,14 @@
 """What learners see of a belief and of a candidate, as numbers of about unit size."""
 
+from typing import Any
+
 import numpy as np
 
 from wsn_env.compiled.elementary import log
 from wsn_env.compiled.kernels import lean_piece
 from wsn_env.envs.merit import chance_of, gain, place_of
 from wsn_env.models.field import squared_distance
-from wsn_env.models.state import sensors_of
+from wsn_env.models.state import Sensors, sensors_of
 
 BELIEF_FEATURES = (
     "lam",  # log, halved
@@ -47,7 +49,9 @@ NINTH = 9
 
 
 @lean_piece
-def describe_belief(known, b, nodes, distances, c, f):
+def describe_belief(
+    known: Any, b: int, nodes: np.ndarray, distances: np.ndarray, c: Any, f: np.ndarray
+) -> tuple[float, float]:
     """Fill f with BELIEF_FEATURES of row b. Returns the direction of the predicted velocity.
 
     Args:
@@ -107,7 +111,20 @@ def _describe_head(head, is_nearest, members, n, sensors, m, p, ex, ey, c, f):
 
 
 @lean_piece
-def describe_candidate(node, detection, head, members, n, sensors, m, p, ex, ey, c, g):
+def describe_candidate(
+    node: int,
+    detection: float,
+    head: int,
+    members: np.ndarray,
+    n: int,
+    sensors: Sensors,
+    m: Any,
+    p: Any,
+    ex: float,
+    ey: float,
+    c: Any,
+    g: np.ndarray,
+) -> None:
     """g[0:2], g[3:7], g[8]: a candidate's place, its chance `detection`, role and gain."""
     dx, dy = (sensors.positions[node, 0] - m[0]) / c.radius_m, (sensors.positions[node, 1] - m[2]) / c.radius_m
     g[0] = dx * ex + dy * ey
@@ -127,7 +144,9 @@ def describe_candidate(node, detection, head, members, n, sensors, m, p, ex, ey,
 
 
 @lean_piece
-def describe_merit(nodes, ordered, drops, spread, width, f):
+def describe_merit(
+    nodes: np.ndarray, ordered: np.ndarray, drops: np.ndarray, spread: Any, width: int, f: np.ndarray
+) -> None:
     """The last two of CANDIDATE_FEATURES, for all candidates.
 
     Args:
@@ -147,7 +166,7 @@ def describe_merit(nodes, ordered, drops, spread, width, f):
 
 
 @lean_piece
-def clip(f):
+def clip(f: np.ndarray) -> None:
     """To what the spaces promise."""
     for i in range(len(f)):
         f[i] = min(max(f[i], np.float32(-BOUND)), np.float32(BOUND))

@@ -21,7 +21,7 @@ TOLD = (
 )
 
 
-def measures(outcome: Mapping[str, Any], lam, reward) -> dict[str, Any]:
+def measures(outcome: Mapping[str, Any], lam: Any, reward: Any) -> dict[str, Any]:
     """The info of a period. It carries truth: for loggers only, never for policies.
 
     Args:

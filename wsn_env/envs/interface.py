@@ -1,11 +1,15 @@
 """What learners meet: actions (spaces <-> Cluster), observations (View -> arrays), rewards, pictures."""
 
 from dataclasses import dataclass
+from typing import Any
 
-from wsn_env.envs.actions import make_action
+from gymnasium.spaces import Box
+
+from wsn_env.envs.actions import Action, ActionName, make_action
 from wsn_env.envs.info import measures
-from wsn_env.envs.observations import make_observation
-from wsn_env.envs.rewards import make_reward, reward_space
+from wsn_env.envs.observations import Observation, ObservationName, make_observation
+from wsn_env.envs.rewards import RewardName, make_reward, reward_space
+from wsn_env.models.measurement.base import Order
 from wsn_env.scenario import Scenario
 
 
@@ -13,25 +17,25 @@ from wsn_env.scenario import Scenario
 class Settings:
     """How an environment speaks, whatever the scenario."""
 
-    action: str = "menu"
-    observation: str = "candidates"
-    reward: str = "error"
-    order: str = "nearest"
+    action: ActionName = "menu"
+    observation: ObservationName = "candidates"
+    reward: RewardName = "error"
+    order: Order = "nearest"
     candidates: int = 12
 
 
 class Interface:
     """The three translations of an environment, bound to a scenario."""
 
-    def __init__(self, scenario: Scenario, settings: Settings, threads: int = 1):
-        self.action = make_action(settings.action, scenario, settings.order, settings.candidates)
-        self.observation = make_observation(
+    def __init__(self, scenario: Scenario, settings: Settings, threads: int = 1) -> None:
+        self.action: Action = make_action(settings.action, scenario, settings.order, settings.candidates)
+        self.observation: Observation = make_observation(
             settings.observation, scenario, settings.order, settings.candidates, threads
         )
-        self.reward_space = reward_space(settings.reward)
+        self.reward_space: Box | None = reward_space(settings.reward)
         self._reward = make_reward(settings.reward)
 
-    def judge(self, outcome, lam):
+    def judge(self, outcome: Any, lam: Any) -> tuple[Any, dict[str, Any]]:
         """A period's reward and info, of arrays (B, ...) or of one row's numbers."""
         reward = self._reward(outcome, lam)
         return reward, measures(outcome, lam, reward if self.reward_space is None else None)

@@ -1,11 +1,14 @@
 """The order in which candidates are worth waking: nearest first, by information, or by information less its price."""
 
+from typing import Any
+
 import numpy as np
 from numba.extending import overload
 
 from wsn_env.compiled.kernels import kernel, lean_piece
 from wsn_env.models.field import squared_distance
 from wsn_env.models.measurement.base import (
+    Order,
     chance,
     equal_everywhere,
     informs,
@@ -14,24 +17,34 @@ from wsn_env.models.measurement.base import (
     packets_a_report,
 )
 from wsn_env.models.radio.base import reception, transmission
-from wsn_env.models.state import knowledge_at, sensors_of
+from wsn_env.models.state import Sensors, knowledge_at, sensors_of
 from wsn_env.simulation.messages import outside
 
-ORDERS = ("nearest", "information", "value")
+ORDERS: tuple[Order, ...] = ("nearest", "information", "value")
 NEAREST, INFORMATION, VALUE = range(len(ORDERS))
 KEEP, BEST, AHEAD = range(3)  # who leads
 LEAD = 0.3  # sensing radii
 
 
 @lean_piece
-def chance_of(sensors, node, mean, cov, c):
+def chance_of(sensors: Sensors, node: int, mean: np.ndarray, cov: np.ndarray, c: Any) -> float:
     """Probability that the node has something to report, under the belief."""
     place = node_of(sensors, node)
     return chance(c.measurement, place, mean[0], mean[2], cov[0, 0], cov[0, 2], cov[2, 2], c)
 
 
 @lean_piece
-def gain(detection, sensors, node, mean, cov, p00, p01, p11, c):
+def gain(
+    detection: float,
+    sensors: Sensors,
+    node: int,
+    mean: np.ndarray,
+    cov: np.ndarray,
+    p00: float,
+    p01: float,
+    p11: float,
+    c: Any,
+) -> tuple[float, float, float, float]:
     """Expected drop of the position covariance's trace by one report of `node` [m^2], and the covariance after it.
 
     Linearised at the prediction. The report comes with probability p, and with it what a report takes from the
@@ -49,7 +62,7 @@ def gain(detection, sensors, node, mean, cov, p00, p01, p11, c):
     return drop_by(lines, informs(c.measurement, detection), p00, p01, p11)
 
 
-def drop_by(lines, probability, p00, p01, p11):
+def drop_by(lines: Any, probability: float, p00: float, p01: float, p11: float) -> tuple[float, float, float, float]:
     """`gain` of a report of one linear number, or of two with independent noise, that comes with this probability."""
     return (_drop_by_one if len(lines) == 1 else _drop_by_two)(lines, probability, p00, p01, p11)
 
@@ -85,13 +98,13 @@ def _drop_by_two(lines, probability, p00, p01, p11):
 
 
 @lean_piece
-def awake_j(sensors, node, c):
+def awake_j(sensors: Sensors, node: int, c: Any) -> float:
     """What a node pays for being awake for a period instead of asleep, packets apart [J]."""
     return c.radio.awake_j - c.radio.asleep_j
 
 
 @lean_piece
-def price_mj(detection, sensors, node, head, mean, c):
+def price_mj(detection: float, sensors: Sensors, node: int, head: int, mean: np.ndarray, c: Any) -> float:
     """Expected energy of a node's being awake for the period instead of asleep, and of its report [mJ].
 
     The report goes to the head, or as far as the prediction where the head is still open; to the sink; to the target.
@@ -110,14 +123,16 @@ def price_mj(detection, sensors, node, head, mean, c):
 
 
 @lean_piece
-def fill_chances(sensors, nodes, mean, cov, c, chances):
+def fill_chances(
+    sensors: Sensors, nodes: np.ndarray, mean: np.ndarray, cov: np.ndarray, c: Any, chances: np.ndarray
+) -> None:
     """chances (K,): of the candidates `nodes`; -1: none."""
     for k in range(len(nodes)):
         chances[k] = chance_of(sensors, nodes[k], mean, cov, c) if nodes[k] >= 0 else -1.0
 
 
 @lean_piece
-def place_of(node, nodes):
+def place_of(node: int, nodes: np.ndarray) -> int:
     """Where a node stands among others; -1: nowhere."""
     for k in range(len(nodes)):
         if nodes[k] == node:
@@ -126,14 +141,28 @@ def place_of(node, nodes):
 
 
 @lean_piece
-def known_chance(sensors, node, nodes, chances, mean, cov, c):
+def known_chance(
+    sensors: Sensors, node: int, nodes: np.ndarray, chances: np.ndarray, mean: np.ndarray, cov: np.ndarray, c: Any
+) -> float:
     """`chance_of` any node; those of the candidates have been filled in."""
     k = place_of(node, nodes)
     return chances[k] if k >= 0 else chance_of(sensors, node, mean, cov, c)
 
 
 @lean_piece
-def order_row(sensors, head, mean, cov, lam, nodes, chances, c, left, ordered, drops):
+def order_row(
+    sensors: Sensors,
+    head: int,
+    mean: np.ndarray,
+    cov: np.ndarray,
+    lam: float,
+    nodes: np.ndarray,
+    chances: np.ndarray,
+    c: Any,
+    left: np.ndarray,
+    ordered: np.ndarray,
+    drops: np.ndarray,
+) -> None:
     """Greedy order of one row's candidates: each next one is the best after those before it, by the drop of the root of
     the position covariance's trace that it brings [m], less lam times its price.
 
@@ -183,7 +212,21 @@ def order_row(sensors, head, mean, cov, lam, nodes, chances, c, left, ordered, d
 
 
 @lean_piece
-def rank_row(by, rule, sensors, head, mean, cov, lam, nodes, chances, c, left, ordered, drops):
+def rank_row(
+    by: int,
+    rule: int,
+    sensors: Sensors,
+    head: int,
+    mean: np.ndarray,
+    cov: np.ndarray,
+    lam: float,
+    nodes: np.ndarray,
+    chances: np.ndarray,
+    c: Any,
+    left: np.ndarray,
+    ordered: np.ndarray,
+    drops: np.ndarray,
+) -> int:
     """Who would lead under a rule, and the candidates in the order that they would join.
 
     Args:
@@ -224,7 +267,16 @@ def _nearest_ahead(sensors, mean, nodes, c):
 
 
 @kernel
-def order_by_merit(start, stop, cs, handle, heads, lams, nodes, ordered):
+def order_by_merit(
+    start: int,
+    stop: int,
+    cs: Any,
+    handle: np.ndarray,
+    heads: np.ndarray,
+    lams: Any,
+    nodes: np.ndarray,
+    ordered: np.ndarray,
+) -> None:
     """`order_row` for every row of what the network knows (Knowledge).
 
     Args:

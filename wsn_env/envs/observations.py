@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, Literal, Protocol
+
 import numpy as np
 from gymnasium import spaces
 
@@ -18,6 +20,7 @@ from wsn_env.envs.features import (
 )
 from wsn_env.envs.merit import ORDERS, fill_chances, order_row, rank_row
 from wsn_env.envs.prospects import ENTRY_FEATURES, describe_entries, describe_standing, foresee
+from wsn_env.models.measurement.base import Order
 from wsn_env.models.quantity import suggest
 from wsn_env.models.state import knowledge_at, sensors_of
 from wsn_env.scenario import Scenario
@@ -25,7 +28,23 @@ from wsn_env.scenario.constants import constants
 from wsn_env.simulation.geometry import find_candidates
 from wsn_env.simulation.view import View
 
+ObservationName = Literal["candidates", "menu", "dict", "view"]
+
 G = len(BELIEF_FEATURES)
+
+
+class Observation(Protocol):
+    """What every one has; its space is of one environment."""
+
+    space: Any  # the class's own, of Gymnasium
+
+    def encode(self, view: View) -> Any:
+        """An array or a dict of arrays (B, ...), fresh."""
+        ...
+
+    def renew(self, view: View, rows: np.ndarray, before: View, last: Any) -> Any:
+        """What `encode` gives, where only some rows (B,) have changed since `last` was encoded from `before`."""
+        ...
 
 
 @lean_kernel
@@ -107,11 +126,11 @@ def _encode_menu(start, stop, cs, handle, terms, rows, whole, real, out):
 class CandidatesObservation:
     """Flat Box float32: BELIEF_FEATURES, then CANDIDATE_FEATURES of the K living nodes nearest to the prediction."""
 
-    features = CANDIDATE_FEATURES
+    features: tuple[str, ...] = CANDIDATE_FEATURES
 
-    def __init__(self, scenario: Scenario, order: str, candidates: int, threads: int = 1):
-        self.shape = (candidates, len(self.features))
-        self.space = spaces.Box(-BOUND, BOUND, (G + candidates * self.shape[1],), np.float32)
+    def __init__(self, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> None:
+        self.shape: tuple[int, int] = (candidates, len(self.features))
+        self.space: spaces.Box = spaces.Box(-BOUND, BOUND, (G + candidates * self.shape[1],), np.float32)
         self._candidates, self._ring_m, self._threads = candidates, scenario.ring_m, threads
         self._scenario, self._constants = scenario, constants(scenario)
 
@@ -122,7 +141,7 @@ class CandidatesObservation:
             view, np.ones(rows, bool), np.empty((rows, *self.space.shape), np.float32), self._scratch(view)
         )
 
-    def renew(self, view: View, rows, before: View, last) -> np.ndarray:
+    def renew(self, view: View, rows: np.ndarray, before: View, last: np.ndarray) -> np.ndarray:
         """What `encode` gives, for less where few rows have changed.
 
         Args:
@@ -151,12 +170,12 @@ class CandidatesObservation:
 class MenuObservation(CandidatesObservation):
     """Flat Box float32: BELIEF_FEATURES, then ENTRY_FEATURES of each entry of the menu: what it promises."""
 
-    features = ENTRY_FEATURES
+    features: tuple[str, ...] = ENTRY_FEATURES
 
-    def __init__(self, scenario: Scenario, order: str, candidates: int, threads: int = 1):
+    def __init__(self, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> None:
         super().__init__(scenario, order, candidates, threads)
-        self.shape = (MENU_ENTRIES, len(self.features))
-        self.space = spaces.Box(-BOUND, BOUND, (G + MENU_ENTRIES * self.shape[1],), np.float32)
+        self.shape: tuple[int, int] = (MENU_ENTRIES, len(self.features))
+        self.space: spaces.Box = spaces.Box(-BOUND, BOUND, (G + MENU_ENTRIES * self.shape[1],), np.float32)
         self._order = order
 
     def _fill(self, view: View, rows, out, scratch) -> np.ndarray:
@@ -167,10 +186,10 @@ class MenuObservation(CandidatesObservation):
 class DictObservation:
     """The same features under names: belief (19,), candidates (K, 11), and lam (1,) [m/mJ]."""
 
-    def __init__(self, scenario: Scenario, order: str, candidates: int, threads: int = 1):
+    def __init__(self, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> None:
         self._flat = CandidatesObservation(scenario, order, candidates, threads)
         high = max(scenario.lam_range[1], 1.0)
-        self.space = spaces.Dict(
+        self.space: Any = spaces.Dict(
             {
                 "belief": spaces.Box(-BOUND, BOUND, (G,), np.float32),
                 "candidates": spaces.Box(-BOUND, BOUND, self._flat.shape, np.float32),
@@ -187,7 +206,7 @@ class DictObservation:
             "lam": np.minimum(view.lam[:, None].astype(np.float32), self.space["lam"].high[0]),
         }
 
-    def renew(self, view: View, rows, before: View, last) -> dict[str, np.ndarray]:
+    def renew(self, view: View, rows: np.ndarray, before: View, last: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """All of it."""
         return self.encode(view)
 
@@ -195,13 +214,13 @@ class DictObservation:
 class ViewObservation:
     """Everything a network could know, as float64: enough for every hand-written policy (`View.from_arrays`)."""
 
-    def __init__(self, scenario: Scenario, order: str, candidates: int, threads: int = 1):
+    def __init__(self, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> None:
         nodes, side, far = scenario.field.nodes, max(scenario.field.room_m), 1e9
 
         def box(low, high, *shape):
             return spaces.Box(low, high, shape, np.float64)
 
-        self.space = spaces.Dict(
+        self.space: spaces.Dict = spaces.Dict(
             {
                 "period": spaces.Discrete(scenario.periods + 1),
                 "lam": box(0.0, max(scenario.lam_range[1], 1.0), 1),
@@ -231,12 +250,12 @@ class ViewObservation:
         """A dict of (B, ...) arrays, fresh."""
         return view.as_arrays()
 
-    def renew(self, view: View, rows, before: View, last) -> dict[str, np.ndarray]:
+    def renew(self, view: View, rows: np.ndarray, before: View, last: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """All of it."""
         return self.encode(view)
 
 
-OBSERVATIONS = {
+OBSERVATIONS: dict[str, Any] = {
     "candidates": CandidatesObservation,
     "menu": MenuObservation,
     "dict": DictObservation,
@@ -244,7 +263,9 @@ OBSERVATIONS = {
 }
 
 
-def make_observation(name: str, scenario: Scenario, order: str, candidates: int, threads: int = 1):
+def make_observation(
+    name: ObservationName, scenario: Scenario, order: Order, candidates: int, threads: int = 1
+) -> Observation:
     """An observation by name.
 
     Raises:

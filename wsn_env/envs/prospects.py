@@ -1,5 +1,7 @@
 """What each entry of the menu promises: the belief, the energy and the cluster that a choice would leave."""
 
+from typing import Any
+
 import numpy as np
 
 from wsn_env.compiled.elementary import expected_error, log
@@ -8,6 +10,7 @@ from wsn_env.envs.merit import awake_j, chance_of, fill_chances, gain, known_cha
 from wsn_env.models.field import squared_distance
 from wsn_env.models.measurement.base import chance, node_of, packets_a_report
 from wsn_env.models.radio.base import reception, transmission
+from wsn_env.models.state import Sensors
 from wsn_env.simulation.messages import outside
 
 ENTRY_FEATURES = (
@@ -32,7 +35,7 @@ AHEAD = 3.0  # periods
 
 
 @lean_piece
-def foresee(sensors, known, m, p, c):
+def foresee(sensors: Sensors, known: Any, m: Any, p: Any, c: Any) -> None:
     """Fill in what is `known` of the candidates, of a row's Sensors: (K,) nodes, -1 for none, and room (K,) for their
     chances of detection now and AHEAD periods on."""
     nodes, chances, later = known
@@ -42,7 +45,18 @@ def foresee(sensors, known, m, p, c):
 
 
 @lean_piece
-def describe_standing(sensors, standing, members, known, m, p, way, numbers, c, f):
+def describe_standing(
+    sensors: Sensors,
+    standing: Any,
+    members: np.ndarray,
+    known: Any,
+    m: Any,
+    p: Any,
+    way: Any,
+    numbers: Any,
+    c: Any,
+    f: np.ndarray,
+) -> None:
     """Fill f with ENTRY_FEATURES of the standing cluster.
 
     Args:
@@ -64,7 +78,21 @@ def describe_standing(sensors, standing, members, known, m, p, way, numbers, c, 
 
 
 @lean_piece
-def describe_entries(sensors, standing, members, known, nodes, head, m, p, way, numbers, c, width, entries):
+def describe_entries(
+    sensors: Sensors,
+    standing: Any,
+    members: np.ndarray,
+    known: Any,
+    nodes: np.ndarray,
+    head: int,
+    m: Any,
+    p: Any,
+    way: Any,
+    numbers: Any,
+    c: Any,
+    width: int,
+    entries: np.ndarray,
+) -> None:
     """Fill entries (N * width,) with ENTRY_FEATURES of the head and the first n further nodes, n = 0..N - 1.
 
     Args:

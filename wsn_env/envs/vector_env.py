@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal, Unpack, cast
 
 import gymnasium as gym
 import numpy as np
@@ -11,10 +11,15 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from wsn_env.compiled import draws
+from wsn_env.envs.actions import ActionName
 from wsn_env.envs.interface import Interface, Settings
-from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera
+from wsn_env.envs.observations import ObservationName
+from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera, RenderMode
+from wsn_env.envs.rewards import RewardName
+from wsn_env.models.measurement.base import Order
 from wsn_env.models.state import State
 from wsn_env.scenario import Scenario
+from wsn_env.scenario.quantities import Quantities
 from wsn_env.simulation.bound import Bound, bound_kind
 from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World
@@ -31,44 +36,49 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         The rest: as ClusterEnv. A vector reward has the shape (B, 2); `reward_space` and `reward_dim` are of one row.
     """
 
-    metadata = {"render_modes": list(RENDER_MODES), "render_fps": FPS, "autoreset_mode": AutoresetMode.NEXT_STEP}
+    metadata: dict[str, Any] = {
+        "render_modes": list(RENDER_MODES),
+        "render_fps": FPS,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
 
     def __init__(
         self,
         num_envs: int = 1,
         scenario: str | Scenario = "PreDC-v0",
-        action: str = "menu",
-        observation: str = "candidates",
-        reward: str = "error",
-        order: str = "nearest",
+        action: ActionName = "menu",
+        observation: ObservationName = "candidates",
+        reward: RewardName = "error",
+        order: Order = "nearest",
         candidates: int = Settings.candidates,
-        render_mode: str | None = None,
+        render_mode: RenderMode | None = None,
         frame_px: int = 600,
         fast: bool = False,
-        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        autoreset_mode: Literal["NextStep", "SameStep", "Disabled"] | AutoresetMode = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
-        **overrides,
-    ):
+        **overrides: Unpack[Quantities],
+    ) -> None:
         if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
             raise ValueError(f"num_envs = {num_envs!r}: must be a whole number, at least 1")
-        self.num_envs = int(num_envs)
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.num_envs: int = int(num_envs)
+        self.autoreset_mode: AutoresetMode = AutoresetMode(autoreset_mode)
         self.metadata = type(self).metadata | {"autoreset_mode": self.autoreset_mode}
-        self.render_mode = render_mode
-        self.scenario = Scenario.of(scenario, **overrides)
+        self.render_mode: RenderMode | None = render_mode
+        self.scenario: Scenario = Scenario.of(scenario, **overrides)
         self._camera = None if render_mode is None else Camera(self.scenario, render_mode, frame_px)
-        self.world = World(self.scenario, threads, fast)
+        self.world: World = World(self.scenario, threads, fast)
         settings = Settings(action, observation, reward, order, candidates)
-        self.interface = Interface(self.scenario, settings, self.world.threads)
-        self.single_action_space = self.interface.action.space
-        self.single_observation_space = self.interface.observation.space
-        self.action_space = batch_space(self.single_action_space, num_envs)
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.interface: Interface = Interface(self.scenario, settings, self.world.threads)
+        self.single_action_space: gym.Space[Any] = self.interface.action.space
+        self.single_observation_space: gym.Space[Any] = self.interface.observation.space
+        self.action_space: gym.Space[Any] = batch_space(self.single_action_space, num_envs)
+        self.observation_space: gym.Space[Any] = batch_space(self.single_observation_space, num_envs)
         if self.interface.reward_space is not None:
-            self.reward_space, self.reward_dim = self.interface.reward_space, 2
+            self.reward_space: gym.spaces.Box = self.interface.reward_space
+            self.reward_dim: int = 2
         self._generators: list[np.random.Generator | None] = [None] * num_envs
-        self._state: State | None = None
-        self._view: View | None = None
+        self._state: State = None  # type: ignore[assignment]  # until the first reset
+        self._view: View = None  # type: ignore[assignment]
         self._last: Any = None  # observation
         self._squares = np.zeros(num_envs)
         self._detections = np.zeros(num_envs, dtype=np.int64)
@@ -77,7 +87,9 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         if bound_kind(self.scenario) != "none":
             self._bound = Bound(self.scenario, self.num_envs, self.world.threads)
 
-    def reset(self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None):
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
         """New episodes, in the rows of options["reset_mask"] only where it is given.
 
         Args:
@@ -99,7 +111,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self._show()
         return self._observe(rows), _masked(info, rows)
 
-    def _rows_to_reset(self, options) -> np.ndarray:
+    def _rows_to_reset(self, options: dict[str, Any] | None) -> np.ndarray:
         mask = (options or {}).get("reset_mask")
         if mask is None:
             return np.ones(self.num_envs, dtype=bool)
@@ -115,7 +127,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         """Begin episodes in some rows; gives the info, which is theirs alone."""
         keys = np.zeros(self.num_envs, np.uint64)
         for i in np.flatnonzero(rows):
-            keys[i] = draws.episode_key(self._generators[i])
+            keys[i] = draws.episode_key(cast(np.random.Generator, self._generators[i]))
         self._state, outcome = self.world.restart(self._state, rows, keys, donate=True)
         self._squares[rows] = 0.0
         self._detections[rows] = 0
@@ -127,7 +139,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             self._camera.begin(self._state, outcome, rows)
         return info
 
-    def step(self, actions):
+    def step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """One period for every row; ended rows start anew as the autoreset mode says."""
         if self._state is None:
             raise gym.error.ResetNeeded("call reset() before step()")
@@ -171,13 +183,15 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
                 info["episode_floor_m"] = self._bound.floor_m(self._state, rows)
         return info
 
-    def _same_step(self, reward, terminated, truncated, info):
+    def _same_step(
+        self, reward: np.ndarray, terminated: np.ndarray, truncated: np.ndarray, info: dict[str, Any]
+    ) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Begin the ended rows within the step; their last observation and info go to final_obs and final_info."""
         last = self._observe()
         final = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(truncated):
             final[i] = {name: value[i] for name, value in last.items()} if isinstance(last, dict) else last[i]
-        infos = {"final_obs": final, "_final_obs": truncated.copy()}
+        infos: dict[str, Any] = {"final_obs": final, "_final_obs": truncated.copy()}
         infos["final_info"] = _masked(info | self._episode_info(truncated), truncated)
         infos["_final_info"] = truncated.copy()
         _overwrite(info, self._restart(truncated), truncated)
@@ -201,14 +215,14 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         """(B, n) bool: which entries of each row's action make sense now."""
         return self.interface.action.masks(self.view)
 
-    def render(self):
+    def render(self) -> Any:
         """A tuple of B frames (frame_px, frame_px, 3) uint8; in "human" mode None: reset and step show one window."""
         if self._camera is None or self._state is None:
             gym.logger.warn("render() needs render_mode='rgb_array' or 'human' and a reset environment")
             return None
         return self._camera.frames(self._state) if self.render_mode == "rgb_array" else None
 
-    def close_extras(self, **kwargs):
+    def close_extras(self, **kwargs: Any) -> None:
         """Close the window, if there is one."""
         if self._camera is not None:
             self._camera.close()
@@ -217,7 +231,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         if self._camera is not None:
             self._camera.show(self._state)
 
-    def _observe(self, rows: np.ndarray | None = None):
+    def _observe(self, rows: np.ndarray | None = None) -> Any:
         """The observation of all rows, of which only `rows` have changed since the last."""
         before, self._view = self._view, View.of(self._state)
         if rows is None or before is None or rows.all():
@@ -228,7 +242,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         return observation
 
 
-def _stacked(actions):
+def _stacked(actions: Any) -> Any:
     """A dict of arrays from a list of dicts, as policies' predict() gives them; anything else as it is."""
     if isinstance(actions, (list, tuple, np.ndarray)) and len(actions) and isinstance(actions[0], dict):
         return {name: np.stack([one[name] for one in actions]) for name in actions[0]}

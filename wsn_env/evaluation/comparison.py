@@ -200,13 +200,18 @@ def evaluate(
         kept.put(block, measured)
         if progress:
             progress(done + 1, len(blocks), block.name if block.lam is None else f"{block.name}, lam {block.lam:g}")
-    rows = []
+    rows: list[Row] = []
     for lam in lams:
         for name, policy in named.items():
             used_lam = lam if getattr(policy, "sees_lam", True) else None
             measured = [one for number in range(-(-episodes // BLOCK)) for one in kept.get(name, used_lam, number)]
             for episode, values in enumerate(at_lam(measured, lam)):
-                row = {"policy": name, "scenario": scenario.name, "episode": episode, "seed": seeds[episode]} | values
+                row: dict[str, Any] = {
+                    "policy": name,
+                    "scenario": scenario.name,
+                    "episode": episode,
+                    "seed": seeds[episode],
+                } | values
                 rows.append({column: row[column] for column in COLUMNS})
     return Evaluation(scenario, tuple(named), lams, episodes, seed, rows)
 

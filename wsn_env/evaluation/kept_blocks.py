@@ -7,6 +7,7 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.policies import Policy
@@ -22,8 +23,8 @@ class KeptBlocks:
     A policy is known by its repr, which for a dataclass shows its parameters, and by the file of its class.
     """
 
-    def __init__(self, folder: str | Path | None, settings: dict, policies: Sequence[Policy]):
-        self._blocks: dict[tuple, list[dict]] = {}
+    def __init__(self, folder: str | Path | None, settings: dict[str, Any], policies: Sequence[Policy]) -> None:
+        self._blocks: dict[tuple, list[dict[str, Any]]] = {}
         self._path = None if folder is None else Path(folder) / BLOCKS_FILE
         if self._path is None:
             return
@@ -44,10 +45,10 @@ class KeptBlocks:
     def has(self, block: Block) -> bool:
         return len(self._blocks.get(block[:3], ())) == len(block.seeds)
 
-    def get(self, name: str, lam: float | None, number: int) -> list[dict]:
+    def get(self, name: str, lam: float | None, number: int) -> list[dict[str, Any]]:
         return self._blocks[name, lam, number]
 
-    def put(self, block: Block, measured: list[dict]) -> None:
+    def put(self, block: Block, measured: list[dict[str, Any]]) -> None:
         self._blocks[block[:3]] = measured
         if self._path is not None:
             with open(self._path, "a") as file:
@@ -59,7 +60,7 @@ def remove_kept_blocks(folder: str | Path) -> None:
     (Path(folder) / BLOCKS_FILE).unlink(missing_ok=True)
 
 
-def _digest(settings: dict, policies: Sequence[Policy]) -> str:
+def _digest(settings: dict[str, Any], policies: Sequence[Policy]) -> str:
     """Of all that decides the rows: settings, policies, recorded tracks, versions and the package's own kernels."""
     sources = [getattr(sys.modules.get(type(policy).__module__), "__file__", None) for policy in policies]
     files = [*settings["scenario"]["motion"].get("tracks", ()), *filter(None, sources)]

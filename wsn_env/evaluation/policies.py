@@ -10,7 +10,7 @@ import json
 from collections.abc import Sequence
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from wsn_env.models.own import class_in
 from wsn_env.models.quantity import parse_overrides, suggest
@@ -33,7 +33,7 @@ def policy_names() -> list[str]:
     return sorted({point.name for point in entry_points(group=GROUP)})
 
 
-def make_policy(name: str, scenario: Scenario, **parameters) -> Policy:
+def make_policy(name: str, scenario: Scenario, **parameters: Any) -> Policy:
     """A policy by name, one of your own from a file, or a learned one from the policy.json that train.py saved.
 
     Args:

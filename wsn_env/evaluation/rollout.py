@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -56,7 +56,7 @@ def _checked(cluster: Cluster, policy: Policy, nodes: int) -> Cluster:
     return cluster
 
 
-def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict]:
+def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str, Any]]:
     """Play one episode for each seed and measure it.
 
     Args:
@@ -69,10 +69,12 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict]:
     honest, more where it is too sure.
     """
     scenario = world.scenario
-    sums = dict.fromkeys(("error", "square", "energy", "members", "handovers", "searches", "lost"), 0.0)
+    names = "error", "square", "energy", "members", "handovers", "searches", "lost"
+    sums: dict[str, Any] = dict.fromkeys(names, 0.0)
     judged, ratios = np.zeros(len(seeds)), np.zeros(len(seeds))
     bound = None if bound_kind(scenario) == "none" else Bound(scenario, len(seeds), world.threads)
-    for state, outcome in episodes(policy, world, seeds, bound and (lambda state, _: bound.begin(state))):
+    begin = None if bound is None else lambda state, _: bound.begin(state)
+    for state, outcome in episodes(policy, world, seeds, begin):
         square, believed = outcome.error_m**2, outcome.posterior_rms_m**2
         sums["error"] += outcome.error_m
         if state.period[0] > scenario.unscored:
@@ -107,7 +109,7 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict]:
     return [{name: values[i].item() for name, values in columns.items()} for i in range(len(seeds))]
 
 
-def at_lam(measured: Sequence[dict], lam: float) -> list[dict]:
+def at_lam(measured: Sequence[dict[str, Any]], lam: float) -> list[dict[str, Any]]:
     """The same episodes with the return at another lam: what `rollout` gives of a policy that does not look at it."""
     return [
         values | {"lam": lam, "return": -(values["sum_error_m"] + lam * values["sum_energy_mj"])} for values in measured
@@ -126,7 +128,7 @@ class Block(NamedTuple):
 
 
 Engine = Callable[
-    [Sequence[Block]], Iterator[tuple[Block, list[dict]]]
+    [Sequence[Block]], Iterator[tuple[Block, list[dict[str, Any]]]]
 ]  # each with what `rollout` measured, as it comes
 
 

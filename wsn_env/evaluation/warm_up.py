@@ -6,10 +6,14 @@ import multiprocessing
 import os
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import suppress
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wsn_env.compiled import store
 from wsn_env.evaluation.progress import Progress
+
+if TYPE_CHECKING:
+    from wsn_env.envs.observations import ObservationName
+    from wsn_env.models.measurement.base import Order
 
 
 class Job(NamedTuple):
@@ -60,10 +64,11 @@ def compile_job(job: Job) -> int:
     from wsn_env.simulation.world import World
 
     before = len(store.compiled)
-    small = {"particles": 20, "periods": 4}
-    for order, observation in (("nearest", "candidates"), ("information", "menu")):
+    small: dict[str, Any] = {"particles": 20, "periods": 4}
+    spoken: tuple[tuple[Order, ObservationName], ...] = (("nearest", "candidates"), ("information", "menu"))
+    for order, observation in spoken:
         for fast in (False, True) if job.fast else (False,):
-            pictures = {"render_mode": "rgb_array", "frame_px": 64}
+            pictures: dict[str, Any] = {"render_mode": "rgb_array", "frame_px": 64}
             env = ClusterEnv(job.scenario, order=order, observation=observation, fast=fast, **pictures, **small)
             env.reset(seed=0)
             env.step(10)
@@ -77,7 +82,7 @@ def compile_job(job: Job) -> int:
         with suppress(ValueError):  # no network for this scenario, or a planner that cannot plan in it
             make_policy(name, scenario).act(View.of(World(scenario).reset([0])))
     for tracker in job.trackers:
-        kept = {"silent_information": False, "resampling": "systematic"}
+        kept: dict[str, Any] = {"silent_information": False, "resampling": "systematic"}
         other = scenario.override(tracker=tracker, **kept)
         for _ in episodes(make_policy("nearest2", other), World(other), [0]):
             pass

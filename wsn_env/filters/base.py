@@ -1,5 +1,9 @@
 """What trackers without particles share."""
 
+from typing import Any
+
+import numpy as np
+
 from wsn_env.models.state import Belief, Network, Reports
 from wsn_env.scenario import Scenario
 
@@ -9,10 +13,10 @@ class MomentTracker:
 
     particles = 0
 
-    def start(self, keys, periods, rows, belief: Belief) -> None:
+    def start(self, keys: np.ndarray, periods: np.ndarray, rows: np.ndarray, belief: Belief) -> None:
         """Nothing to spread."""
 
-    def relocate(self, keys, periods, rows, belief: Belief) -> None:
+    def relocate(self, keys: np.ndarray, periods: np.ndarray, rows: np.ndarray, belief: Belief) -> None:
         """Nothing to move but what a search has set."""
 
 
@@ -22,10 +26,10 @@ class MemorylessTracker(MomentTracker):
     Where these do not suffice, the last estimate stays, and its variance grows by (rest_sd_ms T)^2.
     """
 
-    def __init__(self, scenario: Scenario):
+    def __init__(self, scenario: Scenario) -> None:
         self._growth = (scenario.tracking.rest_sd_ms * scenario.period_s) ** 2
 
-    def locate(self, nodes, places, values):
+    def locate(self, nodes: np.ndarray, places: np.ndarray, values: np.ndarray) -> Any:
         """Where the target is.
 
         Args:
@@ -37,7 +41,15 @@ class MemorylessTracker(MomentTracker):
         """
         raise NotImplementedError
 
-    def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
+    def correct(
+        self,
+        keys: np.ndarray,
+        periods: np.ndarray,
+        belief: Belief,
+        network: Network,
+        reports: Reports,
+        resampled: np.ndarray,
+    ) -> None:
         """Replace the estimate by the period's, in place."""
         for b in range(len(keys)):
             nodes, values = reports.node[b, : reports.count[b]], reports.value[b, : reports.count[b]]

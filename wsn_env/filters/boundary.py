@@ -20,6 +20,8 @@ Differs from the paper: eqs. 12 and 13 as printed leave out F P F', and then the
 x(k+1) for x(k); the last row of eq. 6 lacks its minus signs.
 """
 
+from typing import Any
+
 import numpy as np
 
 from wsn_env.compiled.kernels import kernel, lean_piece, over_rows
@@ -51,19 +53,27 @@ class BoundaryTracker(MomentTracker):
     the target may have crossed its edge long ago. Where nodes sleep, the particle filter is the better tracker.
     """
 
-    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
+    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False) -> None:
         self._threads = threads
         self._constants = constants(scenario)
         self._variant = BOUNDARY_TRACKERS.index(scenario.tracking.tracker)
         self._at_rest = scenario.tracking.start != "known"
 
-    def relocate(self, keys, periods, rows, belief: Belief) -> None:
+    def relocate(self, keys: np.ndarray, periods: np.ndarray, rows: np.ndarray, belief: Belief) -> None:
         """Where a search has set the position of the marked rows: P0, in place."""
         if self._variant not in (RAW, CENTROID):
             p0 = RANGES_P0 if self._variant == RANGES else (UNKNOWN,) * 4
             belief.cov[rows] = np.diag(p0)
 
-    def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
+    def correct(
+        self,
+        keys: np.ndarray,
+        periods: np.ndarray,
+        belief: Belief,
+        network: Network,
+        reports: Reports,
+        resampled: np.ndarray,
+    ) -> None:
         """Correct the prediction with the boundary nodes of the period, in place."""
         how = self._constants, self._variant, self._at_rest
         arrays = belief.row, reports.handle, network.handle
@@ -71,7 +81,17 @@ class BoundaryTracker(MomentTracker):
 
 
 @kernel
-def correct_rows(start, stop, cs, variant, at_rest, periods, beliefs, reports_handle, network_handle):
+def correct_rows(
+    start: int,
+    stop: int,
+    cs: Any,
+    variant: int,
+    at_rest: bool,
+    periods: np.ndarray,
+    beliefs: np.ndarray,
+    reports_handle: np.ndarray,
+    network_handle: np.ndarray,
+) -> None:
     """One period of every row."""
     reports, network = reports_at(reports_handle), network_at(network_handle)
     nodes = np.empty(network.battery.shape[1], np.int32)
@@ -89,7 +109,7 @@ def correct_rows(start, stop, cs, variant, at_rest, periods, beliefs, reports_ha
 
 
 @lean_piece
-def take_prediction(belief):
+def take_prediction(belief: Any) -> None:
     """The belief is what was predicted for this period."""
     for i in range(4):
         belief.mean[i] = belief.predicted_mean[i]
@@ -99,13 +119,13 @@ def take_prediction(belief):
 
 
 @lean_piece
-def middle(mean, c):
+def middle(mean: np.ndarray, c: Any) -> tuple[Any, ...]:
     """(x, y) half a period ago [m]."""
     return mean[0] - 0.5 * c.period_s * mean[1], mean[2] - 0.5 * c.period_s * mean[3]
 
 
 @lean_piece
-def expect_circle(belief, network, bitmap, b, c):
+def expect_circle(belief: Any, network: Any, bitmap: np.ndarray, b: int, c: Any) -> tuple[Any, ...]:
     """The gate: x, y where the circle's centre is expected and how far off it may be [m], for gate_m and three sds.
 
     By the prediction or by the centroid, whichever is sharper: before a filter has learnt a velocity, the centroid.
@@ -121,7 +141,7 @@ def expect_circle(belief, network, bitmap, b, c):
 
 
 @lean_piece
-def list_boundary(gate, positions, reports, nodes, b, c):
+def list_boundary(gate: Any, positions: np.ndarray, reports: Any, nodes: np.ndarray, b: int, c: Any) -> tuple[Any, ...]:
     """The boundary nodes that stand close enough to the circle expected, in `nodes`; their number, and how many there
     were in all."""
     n, told = 0, 0
@@ -136,7 +156,18 @@ def list_boundary(gate, positions, reports, nodes, b, c):
 
 
 @lean_piece
-def update_by_position(belief, network, bitmap, nodes, told, gate, restarts, variant, b, c):
+def update_by_position(
+    belief: Any,
+    network: Any,
+    bitmap: np.ndarray,
+    nodes: np.ndarray,
+    told: Any,
+    gate: Any,
+    restarts: Any,
+    variant: int,
+    b: int,
+    c: Any,
+) -> None:
     """Correct with a fix or a centroid, if there is one."""
     mean, cov = belief.mean, belief.cov
     x, y, spread, age = locate(belief, network, bitmap, nodes, told, gate, variant, b, c)
@@ -155,7 +186,9 @@ def update_by_position(belief, network, bitmap, nodes, told, gate, restarts, var
 
 
 @lean_piece
-def locate(belief, network, bitmap, nodes, told, gate, variant, b, c):
+def locate(
+    belief: Any, network: Any, bitmap: np.ndarray, nodes: np.ndarray, told: Any, gate: Any, variant: int, b: int, c: Any
+) -> tuple[Any, ...]:
     """Where the target is by this period's reports alone.
 
     The covariance of a fix is that of nodes that are off the circle by the radial part of an instant uniform in the
@@ -185,7 +218,7 @@ def locate(belief, network, bitmap, nodes, told, gate, variant, b, c):
 
 
 @lean_piece
-def centroid(network, bitmap, b, c):
+def centroid(network: Any, bitmap: np.ndarray, b: int, c: Any) -> tuple[Any, ...]:
     """Mean of the awake nodes that detect, each uniform in a disc: variance R^2 / (4 n) on an axis."""
     positions, standing, members = network.positions[b], network.row[b], network.members[b]
     x, y, n = 0.0, 0.0, 0
@@ -213,7 +246,7 @@ def _stand_at(x, y, spread, mean, cov):
 
 
 @lean_piece
-def update_by_ranges(belief, positions, nodes, c):
+def update_by_ranges(belief: Any, positions: np.ndarray, nodes: np.ndarray, c: Any) -> None:
     """Extended Kalman update with 0 = |x - v T / 2 - p_i| - R for each boundary node i, linearised twice.
 
     The instant of the crossing is uniform in the period, so that the range errs by (v.u T)^2 / 12, u its direction;

@@ -30,7 +30,15 @@ class _CubatureTracker(MomentTracker):
     def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
         self._constants, self._threads = constants(scenario), threads
 
-    def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
+    def correct(
+        self,
+        keys: np.ndarray,
+        periods: np.ndarray,
+        belief: Belief,
+        network: Network,
+        reports: Reports,
+        resampled: np.ndarray,
+    ) -> None:
         """Predict and correct every row, in place."""
         rest = self.iterations, belief.row, network.positions, reports.count, reports.node, reports.value
         over_rows(_correct_rows, len(keys), self._threads, self._constants, *rest)

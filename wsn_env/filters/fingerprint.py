@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +34,13 @@ class FingerprintMap:
 
     @classmethod
     def survey(
-        cls, points, nodes, model: LinearModel, reach_m: float, samples: int, rng: np.random.Generator
+        cls,
+        points: np.ndarray,
+        nodes: np.ndarray,
+        model: LinearModel,
+        reach_m: float,
+        samples: int,
+        rng: np.random.Generator,
     ) -> FingerprintMap:
         """Strengths at (G, 2) points, means of so many noisy samples."""
         offset = points[:, None] - nodes
@@ -41,7 +48,7 @@ class FingerprintMap:
         strengths = model.expected(points, nodes) + noise
         return cls(points, strengths, (offset**2).sum(axis=-1) < reach_m**2)
 
-    def distances(self, nodes, values) -> np.ndarray:
+    def distances(self, nodes: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Squared distance of each point's fingerprint to strengths (n,) heard by some nodes (n,), over those nodes.
 
         Points where fewer of the nodes could hear the target than elsewhere are out of the question.
@@ -65,7 +72,7 @@ class FingerprintNetwork:
     noise: float  # sd of a strength's difference from a fingerprint, in that unit
     cell_m2: float  # variance of a coordinate within a cell of the map
 
-    def locate(self, nodes, strengths) -> tuple[np.ndarray, np.ndarray]:
+    def locate(self, nodes: np.ndarray, strengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """A fix (2,) and its covariance (2, 2) [m, m^2].
 
         The covariance is the second moment about the fix of a target that may be anywhere on the map, given what was
@@ -91,23 +98,24 @@ def _weigh(distances, width: float) -> np.ndarray:
 class Training:
     """The map of a scenario, and the random points at which a width is judged; by the training seed alone."""
 
-    def __init__(self, scenario: Scenario):
+    def __init__(self, scenario: Scenario) -> None:
         field, reach_m, seed = scenario.field, scenario.reach_m, scenario.tracking.training_seed
         model = LinearModel(scenario)
-        nodes, rng = fixed_positions(field), np.random.default_rng([seed, 0])
+        nodes, rng = np.asarray(fixed_positions(field)), np.random.default_rng([seed, 0])
         line = np.linspace(0.0, field.side_m, POINTS_A_SIDE)
         grid = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
-        self.map = FingerprintMap.survey(grid, nodes, model, reach_m, SAMPLES, rng)
+        self.map: FingerprintMap = FingerprintMap.survey(grid, nodes, model, reach_m, SAMPLES, rng)
         anywhere = rng.uniform(0.0, field.side_m, (VALIDATION, 2))
         sample = FingerprintMap.survey(anywhere, nodes, model, reach_m, 1, rng)
         heard = [v for v in range(VALIDATION) if sample.audible[v].any()]
-        self.points = anywhere[heard]
+        self.points: np.ndarray = anywhere[heard]
         self._distances = np.empty((len(heard), len(grid)))
         for row, v in zip(self._distances, heard, strict=True):
             nodes_heard = np.flatnonzero(sample.audible[v])
             row[:] = self.map.distances(nodes_heard, sample.strengths[v, nodes_heard])
         self._cell_m2, self._noise, self._seed = line[1] ** 2 / 12, model.noise, seed
-        self._unit = scenario.measurement.fingerprint_unit
+        measurement: Any = scenario.measurement  # one that has the unit: scenario.tracking.reads
+        self._unit = measurement.fingerprint_unit
 
     def error(self, width: float) -> float:
         """Root mean square error of the fixes at the validation points [m]."""
@@ -167,7 +175,7 @@ _training = lru_cache(maxsize=8)(Training)
 def _relevant(scenario: Scenario) -> Scenario:
     """The scenario without what a map does not hang on, so that like ones share theirs."""
     tracking = Tracking(training_seed=scenario.tracking.training_seed)
-    own = dict(field=scenario.field, measurement=scenario.measurement, detection=scenario.detection)
+    own: dict[str, Any] = dict(field=scenario.field, measurement=scenario.measurement, detection=scenario.detection)
     return Scenario(name="fingerprints", period_s=3600.0, tracking=tracking, **own)
 
 

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from wsn_env.filters.grnn import GRNNTracker
 from wsn_env.filters.snapshot import SnapshotTracker
 from wsn_env.models.field import fixed_positions
@@ -21,22 +23,30 @@ class FirstFix:
 
     particles = 0
 
-    def __init__(self, tracker: Tracker, scenario: Scenario):
+    def __init__(self, tracker: Tracker, scenario: Scenario) -> None:
         mapped = reads("grnn", scenario.measurement) and fixed_positions(scenario.field) is not None
         self._tracker = tracker
         self._fixer = GRNNTracker(scenario) if mapped else SnapshotTracker(scenario)
         self._whole_m2 = 0.999 * scenario.field.side_m**2 / 12  # of a uniform coordinate, but for rounding
         self._rest_m2s2 = scenario.tracking.rest_sd_ms**2
 
-    def start(self, keys, periods, rows, belief: Belief) -> None:
+    def start(self, keys: np.ndarray, periods: np.ndarray, rows: np.ndarray, belief: Belief) -> None:
         """As the tracker does."""
         self._tracker.start(keys, periods, rows, belief)
 
-    def relocate(self, keys, periods, rows, belief: Belief) -> None:
+    def relocate(self, keys: np.ndarray, periods: np.ndarray, rows: np.ndarray, belief: Belief) -> None:
         """As the tracker does."""
         self._tracker.relocate(keys, periods, rows, belief)
 
-    def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
+    def correct(
+        self,
+        keys: np.ndarray,
+        periods: np.ndarray,
+        belief: Belief,
+        network: Network,
+        reports: Reports,
+        resampled: np.ndarray,
+    ) -> None:
         """Predict and correct, or begin, every row in place."""
         first = (belief.cov[:, [0, 2], [0, 2]] > self._whole_m2).all(axis=1) & (reports.count > 0)
         self._tracker.correct(keys, periods, belief, network, reports, resampled)

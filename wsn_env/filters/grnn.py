@@ -1,5 +1,9 @@
 """Trackers on a fingerprint network: its fixes alone, and a Kalman filter on them."""
 
+from typing import Any
+
+import numpy as np
+
 from wsn_env.filters.base import MemorylessTracker, MomentTracker
 from wsn_env.filters.fingerprint import trained_network
 from wsn_env.filters.kalman import POSITION_ROWS, constant_velocity
@@ -10,11 +14,11 @@ from wsn_env.scenario import Scenario
 class GRNNTracker(MemorylessTracker):
     """The network's fix of each period's strengths. Any nodes may have reported: it compares only what was heard."""
 
-    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
+    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False) -> None:
         super().__init__(scenario)
         self._network = trained_network(scenario)
 
-    def locate(self, nodes, places, values):
+    def locate(self, nodes: np.ndarray, places: np.ndarray, values: np.ndarray) -> Any:
         """The fix, if anybody reported."""
         return self._network.locate(nodes, values[:, 0]) if len(nodes) else None
 
@@ -22,7 +26,7 @@ class GRNNTracker(MemorylessTracker):
 class GRNNKalmanTracker(MomentTracker):
     """filterpy's KalmanFilter with the network's fixes as measurements of the position, and their spread as noise."""
 
-    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
+    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False) -> None:
         from filterpy.kalman import KalmanFilter
 
         self._network = trained_network(scenario)
@@ -30,7 +34,15 @@ class GRNNKalmanTracker(MomentTracker):
         self._filter.F, self._filter.Q = constant_velocity(scenario)
         self._filter.H = POSITION_ROWS
 
-    def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
+    def correct(
+        self,
+        keys: np.ndarray,
+        periods: np.ndarray,
+        belief: Belief,
+        network: Network,
+        reports: Reports,
+        resampled: np.ndarray,
+    ) -> None:
         """Predict and correct every row, in place."""
         kf = self._filter
         for b in range(len(keys)):

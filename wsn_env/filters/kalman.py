@@ -26,14 +26,22 @@ class EKFTracker(MomentTracker):
     no memory but the belief, and loops over rows: its speed is filterpy's.
     """
 
-    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
+    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False) -> None:
         from filterpy.kalman import ExtendedKalmanFilter  # takes a second or two to import
 
         self._model = LinearModel(scenario)
         self._filter = ExtendedKalmanFilter(dim_x=4, dim_z=2)
         self._filter.F, self._filter.Q = constant_velocity(scenario)
 
-    def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
+    def correct(
+        self,
+        keys: np.ndarray,
+        periods: np.ndarray,
+        belief: Belief,
+        network: Network,
+        reports: Reports,
+        resampled: np.ndarray,
+    ) -> None:
         """Predict and correct every row, in place."""
         ekf = self._filter
         for b in range(len(keys)):
@@ -59,7 +67,7 @@ class UKFTracker(MomentTracker):
     of the central point allows, gets it back.
     """
 
-    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
+    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False) -> None:
         from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 
         transition, noise = constant_velocity(scenario)
@@ -70,7 +78,15 @@ class UKFTracker(MomentTracker):
         self._filter.Q = noise
         self._model = LinearModel(scenario)
 
-    def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
+    def correct(
+        self,
+        keys: np.ndarray,
+        periods: np.ndarray,
+        belief: Belief,
+        network: Network,
+        reports: Reports,
+        resampled: np.ndarray,
+    ) -> None:
         """Predict and correct every row, in place."""
         ukf = self._filter
         for b in range(len(keys)):

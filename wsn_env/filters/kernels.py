@@ -4,7 +4,7 @@ Structure of arrays in float32: x (4, P) = x, vx, y, vy. Sums run over 16 fixed 
 vector registers of any width and the bits stay the same.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import int32
@@ -25,7 +25,7 @@ SUMS = 16  # w, w^2, four of w d, ten of w d d'
 
 
 @lean_piece
-def spread(stream, mean, cov, x, log_weights):
+def spread(stream: Any, mean: np.ndarray, cov: np.ndarray, x: np.ndarray, log_weights: np.ndarray) -> None:
     """Draw a cloud ~ N(mean, cov) with equal weights; x and y axes are taken as independent.
 
     Args:
@@ -43,7 +43,7 @@ def spread(stream, mean, cov, x, log_weights):
 
 
 @lean_piece
-def predict(stream, x, period_s, q):
+def predict(stream: Any, x: np.ndarray, period_s: float, q: float) -> None:
     """Constant velocity with white acceleration of sd q [m/s^2] (eqs. 6, 8)."""
     px, vx, py, vy = x[0], x[1], x[2], x[3]
     t = F(period_s)
@@ -57,7 +57,7 @@ def predict(stream, x, period_s, q):
 
 
 @lean_piece
-def normalise(log_weights, weights):
+def normalise(log_weights: np.ndarray, weights: np.ndarray) -> None:
     """Shift the log weights so that the best is 0; `weights` become their exponentials."""
     n = len(log_weights)
     least = int32(2147483647)
@@ -70,7 +70,7 @@ def normalise(log_weights, weights):
 
 
 @piece
-def moments(x, weights, reference, mean, cov):
+def moments(x: np.ndarray, weights: np.ndarray, reference: Any, mean: np.ndarray, cov: np.ndarray) -> tuple[Any, ...]:
     """Weighted mean and covariance about a reference point (eqs. 9-13).
 
     Args:
@@ -133,7 +133,7 @@ def _gather(w, d0, d1, d2, d3, lanes, k):
 
 
 @lean_piece
-def relocate(stream, mean, cov, x):
+def relocate(stream: Any, mean: np.ndarray, cov: np.ndarray, x: np.ndarray) -> None:
     """Draw the particles' positions anew ~ N(mean, cov); velocities and weights stay."""
     sx, sy = F(np.sqrt(cov[0, 0])), F(np.sqrt(cov[2, 2]))
     for i in range(x.shape[1]):
@@ -143,7 +143,9 @@ def relocate(stream, mean, cov, x):
 
 
 @lean_kernel
-def spread_rows(start, stop, keys, periods, rows, belief_handle):
+def spread_rows(
+    start: int, stop: int, keys: np.ndarray, periods: np.ndarray, rows: np.ndarray, belief_handle: np.ndarray
+) -> None:
     """Spread the clouds of the rows marked in `rows` about their beliefs' mean and covariance."""
     belief = belief_at(belief_handle)
     for b in range(start, stop):
@@ -153,7 +155,9 @@ def spread_rows(start, stop, keys, periods, rows, belief_handle):
 
 
 @lean_kernel
-def scatter_rows(start, stop, cs, keys, periods, rows, belief_handle):
+def scatter_rows(
+    start: int, stop: int, cs: Any, keys: np.ndarray, periods: np.ndarray, rows: np.ndarray, belief_handle: np.ndarray
+) -> None:
     """Scatter walkers all over the room in the rows marked."""
     belief = belief_at(belief_handle)
     c = cs[0]
@@ -171,7 +175,9 @@ def scatter_rows(start, stop, cs, keys, periods, rows, belief_handle):
 
 
 @lean_kernel
-def relocate_rows(start, stop, keys, periods, rows, belief_handle):
+def relocate_rows(
+    start: int, stop: int, keys: np.ndarray, periods: np.ndarray, rows: np.ndarray, belief_handle: np.ndarray
+) -> None:
     """Move the clouds of the rows marked in `rows` to their beliefs' position mean and covariance."""
     belief = belief_at(belief_handle)
     for b in range(start, stop):
@@ -189,7 +195,7 @@ class Scratch(NamedTuple):
 
 
 @piece
-def make_scratch(particles):
+def make_scratch(particles: int) -> Any:
     """For so many particles."""
     slots = np.empty((3, particles + REACH), np.int32)
     slots[:, :REACH] = 0  # what `inherit` never writes to
@@ -197,7 +203,9 @@ def make_scratch(particles):
 
 
 @piece
-def filter_row(key, period, belief, network, reports, b, c, maps, scratch):
+def filter_row(
+    key: Any, period: int, belief: Any, network: Any, reports: Any, b: int, c: Any, maps: np.ndarray, scratch: Any
+) -> Any:
     """One period of row b: `period` counts from 1; the belief is that after the period before.
 
     Args:
@@ -229,7 +237,7 @@ def filter_row(key, period, belief, network, reports, b, c, maps, scratch):
 
 
 @lean_piece
-def redraw_row(key, period, belief, b):
+def redraw_row(key: Any, period: int, belief: Any, b: int) -> None:
     """The new head of row b draws its particles from the mean and covariance handed over, with equal weights."""
     x, mean, root = belief.particles[b], belief.row[b].mean, lower_root(belief.row[b].cov)
     stream = draws.stream(key, period, draws.HANDOVER)
@@ -241,7 +249,18 @@ def redraw_row(key, period, belief, b):
 
 
 @kernel
-def filter_rows(start, stop, cs, maps, keys, periods, resampled, belief_handle, reports_handle, network_handle):
+def filter_rows(
+    start: int,
+    stop: int,
+    cs: Any,
+    maps: np.ndarray,
+    keys: np.ndarray,
+    periods: np.ndarray,
+    resampled: np.ndarray,
+    belief_handle: np.ndarray,
+    reports_handle: np.ndarray,
+    network_handle: np.ndarray,
+) -> None:
     """One period of the filter alone."""
     belief, reports, network = belief_at(belief_handle), reports_at(reports_handle), network_at(network_handle)
     scratch = make_scratch(belief.particles.shape[2])

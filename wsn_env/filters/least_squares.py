@@ -1,5 +1,7 @@
 """Least squares in closed form: a Kalman update with one number, and the centre of a circle through nodes."""
 
+from typing import Any
+
 import numpy as np
 
 from wsn_env.compiled.kernels import lean_piece
@@ -8,7 +10,7 @@ SINGULAR = 1e6  # condition number from which nodes stand in a line
 
 
 @lean_piece
-def scalar_update(mean, cov, h, residual, variance):
+def scalar_update(mean: np.ndarray, cov: np.ndarray, h: Any, residual: float, variance: float) -> None:
     """Kalman update with one number z = h x + noise: K = P h / (h P h + r), x + K (z - h x), (I - K h) P.
 
     Args:
@@ -33,7 +35,7 @@ def _times(cov, i, h):
 
 
 @lean_piece
-def circle_centre(positions, nodes):
+def circle_centre(positions: np.ndarray, nodes: np.ndarray) -> tuple[Any, ...]:
     """Least-squares centre of a circle of unknown radius through nodes: eqs. 3-8 over all pairs.
 
         x = 1/2 M^-1 sum (p_i - pbar) (|p_i|^2 - mean |p|^2),  M = sum (p_i - pbar) (p_i - pbar)'

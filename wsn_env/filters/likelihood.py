@@ -1,12 +1,16 @@
 """What it tells that of the awake nodes just some reported, particle by particle."""
 
+from typing import Any
+
+import numpy as np
+
 from wsn_env.compiled.kernels import lean_piece
 from wsn_env.models.detection.base import weigh_detection, weigh_silence
 from wsn_env.models.measurement.base import node_at
 
 
 @lean_piece
-def weigh_awake(x, log_weights, network, nodes, b, c):
+def weigh_awake(x: np.ndarray, log_weights: np.ndarray, network: Any, nodes: np.ndarray, b: int, c: Any) -> None:
     """Add what it tells that of the awake nodes of row b just `nodes` (m,) reported, beside what they measured.
 
     A report is heard with probability `delivery`, the head's with `head_delivery`. A node without energy tells nothing.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,10 +24,11 @@ class Lines(NamedTuple):
 class LinearModel:
     """The measurement of a scenario."""
 
-    def __init__(self, scenario: Scenario):
-        self._constants, self.values = constants(scenario), scenario.measurement.values
+    def __init__(self, scenario: Scenario) -> None:
+        self._constants = constants(scenario)
+        self.values: int = scenario.measurement.values
 
-    def lines(self, x: float, y: float, places, values) -> Lines:
+    def lines(self, x: float, y: float, places: np.ndarray, values: np.ndarray) -> Lines:
         """About a target at (x, y).
 
         Args:
@@ -40,17 +41,17 @@ class LinearModel:
         _linearise(self._constants, float(x), float(y), places, values, *made)
         return Lines(*made)
 
-    def near(self, values, about) -> np.ndarray:
+    def near(self, values: np.ndarray, about: Any) -> np.ndarray:
         """Values (n, k), told near others (n, k)."""
         told = np.empty(values.shape)
         _unwrap(self._constants, values, about, told)
         return told
 
-    def expected(self, points, places) -> np.ndarray:
+    def expected(self, points: np.ndarray, places: np.ndarray) -> np.ndarray:
         """(G, n) the first number that nodes (n, 2) are expected to measure of targets at points (G, 2)."""
         return np.stack([lines.expected[:, 0] for lines in self._at(points, places)])
 
-    def slopes(self, points, places) -> np.ndarray:
+    def slopes(self, points: np.ndarray, places: np.ndarray) -> np.ndarray:
         """(G, n, 2) how it changes with the target's x and y."""
         return np.stack([lines.slope[:, 0] for lines in self._at(points, places)])
 

@@ -1,5 +1,7 @@
 """The cluster particle filter (Xiang & Guo, 2013, eqs. 9-15); its arithmetic stands in `kernels`."""
 
+import numpy as np
+
 from wsn_env.compiled import kernels as compiling
 from wsn_env.compiled.kernels import over_rows, threads_for
 from wsn_env.filters import kernels
@@ -16,15 +18,15 @@ class ParticleTracker:
     reports only predicts.
     """
 
-    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
-        self.particles = scenario.tracking.particles
+    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False) -> None:
+        self.particles: int = scenario.tracking.particles
         self.threads = threads
         self._filter_rows = compiling.fast(kernels.filter_rows) if fast else kernels.filter_rows
         self._constants = constants(scenario)
-        self.maps = scenario.measurement.residual_maps(scenario.field.nodes)
+        self.maps: np.ndarray = scenario.measurement.residual_maps(scenario.field.nodes)
         self._anywhere = scenario.tracking.velocity_s is not None and scenario.tracking.start != "known"
 
-    def start(self, keys, periods, rows, belief: Belief) -> None:
+    def start(self, keys: np.ndarray, periods: np.ndarray, rows: np.ndarray, belief: Belief) -> None:
         """Draw the clouds of the marked rows from N(mean, cov), in place; of walkers whose start is not known, from all
         over the room."""
         threads = threads_for(rows, self.threads)
@@ -33,12 +35,20 @@ class ParticleTracker:
             return
         over_rows(kernels.spread_rows, len(keys), threads, keys, periods, rows, belief.handle)
 
-    def relocate(self, keys, periods, rows, belief: Belief) -> None:
+    def relocate(self, keys: np.ndarray, periods: np.ndarray, rows: np.ndarray, belief: Belief) -> None:
         """Draw the positions of the marked rows' particles from N(mean, cov), in place; keep the velocities."""
         threads = threads_for(rows, self.threads)
         over_rows(kernels.relocate_rows, len(keys), threads, keys, periods, rows, belief.handle)
 
-    def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
+    def correct(
+        self,
+        keys: np.ndarray,
+        periods: np.ndarray,
+        belief: Belief,
+        network: Network,
+        reports: Reports,
+        resampled: np.ndarray,
+    ) -> None:
         """Predict, weigh, read mean and covariance, resample, in place."""
         handles = belief.handle, reports.handle, network.handle
         own = self._constants, self.maps

@@ -5,6 +5,8 @@ process noise parts them; where there is little, the cloud shrinks to a few poin
 resampling of patent CN103152791 sets the further copies about their parent instead, in pairs.
 """
 
+from typing import Any
+
 import numpy as np
 from numba import int32, uint32
 
@@ -18,7 +20,15 @@ REACH = 16  # slots of the running maximum's widest window
 
 
 @lean_piece
-def resample(u, x, log_weights, weights, total, slots, states):
+def resample(
+    u: float,
+    x: np.ndarray,
+    log_weights: np.ndarray,
+    weights: np.ndarray,
+    total: float,
+    slots: np.ndarray,
+    states: np.ndarray,
+) -> None:
     """Systematic resampling in place, without a search.
 
     Args:
@@ -33,7 +43,7 @@ def resample(u, x, log_weights, weights, total, slots, states):
 
 
 @lean_piece
-def inherit(u, weights, total, ended, recent, ancestors):
+def inherit(u: float, weights: np.ndarray, total: float, ended: Any, recent: np.ndarray, ancestors: np.ndarray) -> None:
     """Find every slot's ancestor: the particle after the last one that ends before the slot.
 
     Ends ascend, so of the particles that end at one place the last to be written stays. What is left is a running
@@ -68,7 +78,7 @@ def inherit(u, weights, total, ended, recent, ancestors):
 
 
 @lean_piece
-def draw(x, ancestors, states, drawn):
+def draw(x: np.ndarray, ancestors: np.ndarray, states: np.ndarray, drawn: np.ndarray) -> None:
     """Replace every particle by its ancestor; its four numbers move as one of 16 bytes."""
     n = x.shape[1]
     px, vx, py, vy = x[0], x[1], x[2], x[3]
@@ -88,7 +98,7 @@ def draw(x, ancestors, states, drawn):
 
 
 @lean_piece
-def spread_copies(stream, ancestors, scale, cov, x):
+def spread_copies(stream: Any, ancestors: np.ndarray, scale: float, cov: np.ndarray, x: np.ndarray) -> None:
     """Set the further copies of every particle about it, in pairs that leave the mean where it is.
 
         n = 2m + 1 copies    x, x +- j S, j = 1..m
@@ -125,7 +135,7 @@ def spread_copies(stream, ancestors, scale, cov, x):
 
 
 @lean_piece
-def lower_root(cov):
+def lower_root(cov: np.ndarray) -> tuple[Any, ...]:
     """The ten entries, row by row, of the lower triangular L with L L' = cov (4, 4), in float32 (Cholesky).
 
     A direction in which the cloud has no extent, but for rounding, gets none.
@@ -150,7 +160,7 @@ def _pivot(rest, variance):
 
 
 @lean_piece
-def correlated(stream, index, root):
+def correlated(stream: Any, index: int, root: Any) -> tuple[Any, ...]:
     """L u with u ~ N(0, I), number `index` of a stream; four float32."""
     l00, l10, l11, l20, l21, l22, l30, l31, l32, l33 = root
     u0, u1 = normal_pair32(draws.bits(stream, 2 * index))

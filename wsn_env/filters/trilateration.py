@@ -1,5 +1,7 @@
 """Where a target is, from one period's strengths alone: linear and nonlinear least squares."""
 
+from typing import Any
+
 import numpy as np
 
 from wsn_env.compiled.kernels import kernel
@@ -20,12 +22,12 @@ class TrilaterationTracker(MemorylessTracker):
     What lies FARTHEST sides from the field or more is taken to lie there, and no sd is larger.
     """
 
-    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False):
+    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False) -> None:
         super().__init__(scenario)
-        self._measurement = scenario.measurement
+        self._measurement: Any = scenario.measurement  # one with squared_ranges: scenario.tracking.reads
         self._constants, self._side_m = constants(scenario), scenario.field.side_m
 
-    def locate(self, nodes, places, values):
+    def locate(self, nodes: np.ndarray, places: np.ndarray, values: np.ndarray) -> Any:
         """The solution, if there is one."""
         far = FARTHEST * self._side_m
         found = trilaterate(places, *self._measurement.squared_ranges(values[:, 0], far))
@@ -41,7 +43,7 @@ class NonlinearLSTracker(TrilaterationTracker):
     The estimate stays within a tenth of the side about the field, and so does each step's length.
     """
 
-    def locate(self, nodes, places, values):
+    def locate(self, nodes: np.ndarray, places: np.ndarray, values: np.ndarray) -> Any:
         """The solution, where there is a linear one."""
         rough = super().locate(nodes, places, values)
         if rough is None:
@@ -80,7 +82,7 @@ def _fit_point(cs, nodes, strengths, point, cov):
             break
 
 
-def trilaterate(nodes, squared, sd):
+def trilaterate(nodes: np.ndarray, squared: np.ndarray, sd: np.ndarray) -> Any:
     """Linear least squares from squared ranges d_i^2 to nodes p_i.
 
     The first node's circle is taken from the others', which leaves 2 (p_i - p_1)' x = d_1^2 - d_i^2 + |p_i|^2 - |p_1|^2

@@ -1,5 +1,7 @@
 """Particles of a target that walks in a room: its velocity is an Ornstein-Uhlenbeck process, and walls reflect it."""
 
+from typing import Any
+
 import numpy as np
 
 from wsn_env.compiled import draws
@@ -10,7 +12,9 @@ from wsn_env.models.motion.prediction import ROUGHENING_M
 
 
 @lean_piece
-def scatter_walkers(stream, x, log_weights, sd_ms, side_m, depth_m):
+def scatter_walkers(
+    stream: Any, x: np.ndarray, log_weights: np.ndarray, sd_ms: float, side_m: float, depth_m: float
+) -> None:
     """Particles anywhere in the room, with any velocity."""
     n = x.shape[1]
     for i in range(n):
@@ -22,7 +26,7 @@ def scatter_walkers(stream, x, log_weights, sd_ms, side_m, depth_m):
 
 
 @lean_piece
-def walk(stream, x, t):
+def walk(stream: Any, x: np.ndarray, t: Any) -> None:
     """One period of a walk: v' = a v + sd sqrt(1 - a^2) e, x' = x + T (v + v') / 2, reflected at the walls."""
     kept = F(t.velocity_kept)
     fresh = F(t.velocity_sd * np.sqrt(1.0 - t.velocity_kept * t.velocity_kept))

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
+from wsn_env.models.measurement.base import Order
 from wsn_env.scenario import Scenario
 
 
-def default_order(scenario: Scenario) -> Literal["nearest", "information", "value"]:
+def default_order(scenario: Scenario) -> Order:
     """The menu's order of merit: by what the nodes measure."""
     return scenario.measurement.order
 

@@ -100,7 +100,7 @@ class Network:
         Path(path).write_bytes(save(self.arrays))
 
     @staticmethod
-    def load(path: str | Path) -> Network:
+    def load(path: str | Path) -> FlatNetwork | EntryNetwork:
         """Read a safetensors file of either kind; nothing in it is executed.
 
         Raises:

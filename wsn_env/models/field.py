@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isqrt
+from typing import Any, Literal
 
 import numpy as np
 
@@ -25,7 +26,7 @@ class Field(Section):
         at_most=100_000,
         optional=True,
     )
-    layout: str = quantity(
+    layout: Literal["uniform", "grid"] = quantity(
         "uniform",
         "uniform: anywhere; grid: each within a square cell of its own (a square number of nodes)",
         choices=("uniform", "grid"),
@@ -42,7 +43,7 @@ class Field(Section):
     )
     positions: tuple[tuple[float, float], ...] | None = None  # m; given nodes instead of drawn ones
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         super().__post_init__()
         if self.depth_m is not None and self.positions is None:
             raise ScenarioError(f"Field.depth_m = {self.depth_m}: must be None where nodes are drawn")
@@ -74,7 +75,7 @@ class Field(Section):
 
 
 @piece
-def scatter(stream, side_m, positions):
+def scatter(stream: Any, side_m: float, positions: np.ndarray) -> None:
     """Draw the positions (S, 2) uniformly in the square [m]."""
     for i in range(len(positions)):
         positions[i, 0] = side_m * draws.uniform(stream, 2 * i)
@@ -82,7 +83,7 @@ def scatter(stream, side_m, positions):
 
 
 @piece
-def lay_out(stream, side_m, jitter, positions):
+def lay_out(stream: Any, side_m: float, jitter: float, positions: np.ndarray) -> None:
     """Draw the positions (S, 2), S a square number: each within `jitter` cells of the middle of its own cell [m]."""
     across = int(np.round(np.sqrt(len(positions))))
     cell = side_m / across
@@ -91,7 +92,7 @@ def lay_out(stream, side_m, jitter, positions):
         positions[i, 1] = cell * (i // across + 0.5 + jitter * (2.0 * draws.uniform(stream, 2 * i + 1) - 1.0))
 
 
-def fixed_positions(field: Field):
+def fixed_positions(field: Field) -> np.ndarray | None:
     """Where the nodes stand in every episode alike: (S, 2) m, or None where each episode draws its own."""
     if field.positions is not None:
         return np.array(field.positions)
@@ -112,7 +113,7 @@ def _place_by_key(key, side_m, in_grid, jitter, positions):
 
 
 @lean_piece
-def squared_distance(positions, i, x, y):
+def squared_distance(positions: np.ndarray, i: int, x: float, y: float) -> float:
     """Squared distance of node i to (x, y) [m^2]."""
     dx = positions[i, 0] - x
     dy = positions[i, 1] - y

@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields
 from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numba import types
@@ -25,6 +25,9 @@ from wsn_env.compiled.arrays import record
 from wsn_env.compiled.kernels import fast, lean_piece, piece
 from wsn_env.compiled.stamp import stamp
 from wsn_env.models.quantity import ScenarioError, Section
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -38,16 +41,17 @@ class Kind(Section):
 
     allocates: ClassVar[bool] = True  # whether its functions may make arrays; those that need not are a little faster
 
-    def constants(self, scenario) -> dict[str, float]:
+    def constants(self, scenario: Scenario) -> dict[str, float]:
         """Numbers for the kind's functions, by name; here every setting that is a number.
 
         Args:
             scenario: the Scenario that the kind is part of.
         """
-        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        values: dict[str, Any] = {item.name: getattr(self, item.name) for item in fields(self)}
         optional = [item.name for item in fields(self) if item.metadata.get("allowed", {}).get("optional")]
         values |= {name: np.nan for name in optional if values[name] is None}  # the type must not hang on the value
-        return {name: value for name, value in values.items() if isinstance(value, (int, float, np.number))}
+        kinds: Any = int, float, np.number
+        return {name: value for name, value in values.items() if isinstance(value, kinds)}
 
     def check_functions(self) -> None:
         """Raise ScenarioError unless the kind has every function that its role requires."""
@@ -61,16 +65,17 @@ class Kind(Section):
 _marked: dict[str, type[Kind]] = {}  # kinds by the mark in the type of their constants
 
 
-def constants_type(kind: Kind, scenario) -> np.dtype:
+def constants_type(kind: Kind, scenario: Scenario) -> np.dtype[np.void]:
     """The type of a kind's record of constants: its mark, and the constants by name."""
     kind.check_functions()
     numbers = kind.constants(scenario)
-    mark = f"{type(kind).__name__}_{_code_stamp(type(kind))}"
-    _marked[mark] = type(kind)
+    own: Any = type(kind)  # mypy takes no class of dataclasses for hashable
+    mark = f"{own.__name__}_{_code_stamp(own)}"
+    _marked[mark] = own
     return record([(mark, "i1"), *((name, _number_type(value)) for name, value in numbers.items())])
 
 
-def fill_constants(row, kind: Kind, scenario) -> None:
+def fill_constants(row: np.ndarray, kind: Kind, scenario: Scenario) -> None:
     """Write a kind's constants into its record."""
     for name, value in kind.constants(scenario).items():
         row[name] = value
@@ -86,7 +91,7 @@ def _code_stamp(kind: type[Kind]) -> str:
     return stamp(*(function for function in own.values() if function is not None), more=sorted(own))
 
 
-def by_kind(function: Callable) -> Any:
+def by_kind(function: Callable[..., Any]) -> Any:
     """What kernels call for a role's function: that of the kind whose constants are the first argument.
 
     Args:
@@ -148,13 +153,15 @@ def _fast(function: Callable, allocates: bool) -> Any:
 class Registry:
     """The kinds of a role by name: that of the file in the role's package that the class stands in."""
 
-    def __init__(self, role: type[Kind], package: str):
-        self.role, self._package = role, package
+    def __init__(self, role: type[Kind], package: str) -> None:
+        self.role: type[Kind] = role
+        self._package = package
 
     @property
     def kinds(self) -> dict[str, type[Kind]]:
         """Every shipped kind."""
-        return _found(self.role, self._package)
+        role: Any = self.role  # as in `constants_type`
+        return _found(role, self._package)
 
     def name_of(self, kind: type[Kind]) -> str:
         """Of a shipped kind its name; of another its class's."""

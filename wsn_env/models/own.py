@@ -41,7 +41,7 @@ def class_in(path: Path, name: str) -> Any:
     return getattr(module, name)
 
 
-def kind_and_settings(registry: Registry, role: str, text: str) -> tuple[type[Kind], dict]:
+def kind_and_settings(registry: Registry, role: str, text: str) -> tuple[type[Kind], dict[str, Any]]:
     """The kind that a text names, and its settings: "rssi", "rssi,noise_db=2", "mine.py:MyBearing,sd_deg=3"."""
     name, comma, rest = text.partition(",")
     settings = parse_overrides(rest.split(",")) if comma else {}

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import difflib
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
 
-NUMBERS = (int, float, np.integer, np.floating)
+NUMBERS: Any = (int, float, np.integer, np.floating)
 
 
 class ScenarioError(ValueError):
     """A quantity is not what it may be; the message names it, its value and what is allowed."""
 
 
-def quantity(default, meaning, **allowed):
+def quantity(default: Any, meaning: str, **allowed: Any) -> Any:
     """A field with its meaning and what is allowed, in the words of `check_quantity`."""
     return field(default=default, metadata={"meaning": meaning, "allowed": allowed})
 
@@ -23,15 +25,15 @@ def quantity(default, meaning, **allowed):
 def check_quantity(
     owner: str,
     name: str,
-    value,
+    value: Any,
     *,
-    above=None,
-    at_least=None,
-    at_most=None,
-    below=None,
-    whole=False,
-    choices=None,
-    optional=False,
+    above: float | None = None,
+    at_least: float | None = None,
+    at_most: float | None = None,
+    below: float | None = None,
+    whole: bool = False,
+    choices: tuple[Any, ...] | None = None,
+    optional: bool = False,
 ) -> None:
     """Raise ScenarioError unless `value` is allowed for the field `name` of `owner`.
 
@@ -68,7 +70,7 @@ def check_quantity(
 class Section:
     """Base of all sections: checks every quantity when it is made."""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for item in fields(self):
             if "allowed" in item.metadata:
                 value, allowed = getattr(self, item.name), item.metadata["allowed"]
@@ -77,22 +79,22 @@ class Section:
                     object.__setattr__(self, item.name, int(value))
 
 
-def suggest(name: str, known) -> str:
+def suggest(name: str, known: Iterable[object]) -> str:
     """What to write instead of an unknown name."""
-    known = sorted(map(str, known))
-    near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
-    return f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(known)}"
+    names = sorted(map(str, known))
+    near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+    return f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(names)}"
 
 
-def parse_overrides(pairs) -> dict:
+def parse_overrides(pairs: Iterable[str]) -> dict[str, Any]:
     """{"nodes": 400} from ["nodes=400"]; values are numbers, true/false, none, or words."""
-    overrides = {}
+    overrides: dict[str, Any] = {}
     for pair in pairs:
         name, equals, text = pair.partition("=")
         if not equals:
             raise ValueError(f"{pair!r}: must be name=value")
-        words = {"true": True, "false": False, "none": None}
-        value = words.get(text.lower(), text)
+        words: dict[str, Any] = {"true": True, "false": False, "none": None}
+        value: Any = words.get(text.lower(), text)
         if value is text:
             for kind in (int, float):
                 try:

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from wsn_env.compiled.arrays import Arrays, array, opener, part, record
 from wsn_env.compiled.kernels import inline_piece
@@ -148,8 +149,11 @@ class State(Arrays):
         return Knowledge(self.row, self.network, self.reports, self.belief.row, self.belief.receivers)
 
 
-state_at, knowledge_at, network_at = opener(State), opener(Knowledge), opener(Network)
-belief_at, reports_at = opener(Belief), opener(Reports)
+state_at: Any = opener(State)
+knowledge_at: Any = opener(Knowledge)
+network_at: Any = opener(Network)
+belief_at: Any = opener(Belief)
+reports_at: Any = opener(Reports)
 
 
 class Sensors(NamedTuple):
@@ -160,7 +164,7 @@ class Sensors(NamedTuple):
 
 
 @inline_piece
-def sensors_of(known, b):
+def sensors_of(known: Any, b: int) -> Sensors:
     """The nodes of row b of what the network knows (Knowledge)."""
     return Sensors(known.network.positions[b], known.receivers[b])
 
@@ -176,7 +180,7 @@ class Cluster(NamedTuple):
     members: np.ndarray  # (B, M) nodes, -1: no entry; the head may be among them, it always senses
 
     @classmethod
-    def of(cls, head, chosen) -> Cluster:
+    def of(cls, head: npt.ArrayLike, chosen: npt.ArrayLike) -> Cluster:
         """From masks.
 
         Args:
@@ -229,13 +233,21 @@ class Tracker(Protocol):
 
     particles: int  # P of its beliefs
 
-    def start(self, keys, periods, rows, belief: Belief) -> None:
+    def start(self, keys: np.ndarray, periods: np.ndarray, rows: np.ndarray, belief: Belief) -> None:
         """Spread the beliefs of the rows marked in `rows` (B,) about their mean and cov, in place."""
 
-    def relocate(self, keys, periods, rows, belief: Belief) -> None:
+    def relocate(self, keys: np.ndarray, periods: np.ndarray, rows: np.ndarray, belief: Belief) -> None:
         """After a search has set the position's mean and cov of the marked rows: move there, keep the velocity."""
 
-    def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
+    def correct(
+        self,
+        keys: np.ndarray,
+        periods: np.ndarray,
+        belief: Belief,
+        network: Network,
+        reports: Reports,
+        resampled: np.ndarray,
+    ) -> None:
         """Predict from the period before and correct with the reports, in place.
 
         Sets mean, cov and n_eff; `resampled` (B,) tells where the head had to broadcast.

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache, cached_property
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import Any
+from typing import Any, Unpack, cast
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from wsn_env.models.quantity import NUMBERS, ScenarioError, Section, quantity, s
 from wsn_env.models.radio.base import Link
 from wsn_env.models.radio.radio import Radio
 from wsn_env.models.recordings.replay import read_quantities
+from wsn_env.scenario.quantities import Quantities
 from wsn_env.scenario.tracking import BOUNDARY_TRACKERS, Tracking, reads
 
 PARTS: dict[str, type] = {
@@ -65,7 +66,7 @@ class Scenario(Section):
     radio: Link = Radio()
     tracking: Tracking = Tracking()
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         super().__post_init__()
         for name, part in PARTS.items():
             value = getattr(self, name)
@@ -86,7 +87,8 @@ class Scenario(Section):
     def _check_tracker(self) -> None:
         name, kind = self.tracking.tracker, type(self.measurement)
         if not reads(name, self.measurement):
-            able = [known for known, its_kind in MEASUREMENTS.kinds.items() if reads(name, its_kind())]
+            kinds: dict[str, Any] = dict(MEASUREMENTS.kinds)
+            able = [known for known, its_kind in kinds.items() if reads(name, its_kind())]
             allowed = "allowed are the measurements" if len(able) > 1 else "allowed is the measurement"
             raise ScenarioError(
                 f"Tracking.tracker = {name!r}: cannot read {kind.__name__} reports; {allowed} {' and '.join(able)}"
@@ -122,7 +124,7 @@ class Scenario(Section):
         """Where the typical error and the typical energy cost about the same, to one digit [m/mJ]."""
         return float(f"{self.typical_error_m / self.typical_energy_mj:.1g}")
 
-    def typical_cost(self, lam):
+    def typical_cost(self, lam: Any) -> Any:
         """What a period of a good schedule costs at this lam, about [m]: the scale of a learner's rewards.
 
         A schedule that lam suits pays for less energy the dearer it is, hence the root.
@@ -173,12 +175,12 @@ class Scenario(Section):
         return self.radio.handover_bits if self.radio.handover == "estimate" else 5 * 32 * self.tracking.particles
 
     @classmethod
-    def of(cls, scenario: str | Scenario, /, **overrides) -> Scenario:
+    def of(cls, scenario: str | Scenario, /, **overrides: Unpack[Quantities]) -> Scenario:
         """A scenario from a preset's name or from a scenario, with overrides by quantity."""
-        return scenario.override(**overrides) if isinstance(scenario, cls) else cls.named(scenario, **overrides)
+        return scenario.override(**overrides) if isinstance(scenario, Scenario) else cls.named(scenario, **overrides)
 
     @classmethod
-    def named(cls, name: str, /, **overrides) -> Scenario:
+    def named(cls, name: str, /, **overrides: Unpack[Quantities]) -> Scenario:
         """A preset, with overrides by quantity.
 
         Args:
@@ -190,18 +192,19 @@ class Scenario(Section):
             raise ScenarioError(f"scenario {name!r} is unknown: {suggest(short, presets())}")
         return presets()[short].override(**overrides)
 
-    def override(self, **changes) -> Scenario:
+    def override(self, **quantities: Unpack[Quantities]) -> Scenario:
         """A copy with some quantities changed, whatever section they stand in.
 
         Sections are given whole or, where there are several kinds, by name: `override(nodes=400, motion="sine",
         amplitude_m=20, tracker="ekf")`. An unknown keyword raises and suggests. `calibration=FILE` stands for all
         quantities that `wsn calibrate` wrote into the file. A replay without `periods` is as long as its recording.
         """
+        changes: dict[str, Any] = dict(quantities)
         if "calibration" in changes:
             changes = read_quantities(changes.pop("calibration")) | changes
         if changes.get("positions") is not None:
             changes.setdefault("nodes", Field.nodes)  # the positions tell how many
-        whole = {}
+        whole: dict[str, Any] = {}
         for name, registry in BY_NAME.items():
             if isinstance(changes.get(name), str):
                 kind, settings = kind_and_settings(registry, name, changes.pop(name))
@@ -219,12 +222,14 @@ class Scenario(Section):
                 whole[item.name] = changes.pop(item.name)
         known: dict[str, Any] = {}
         for item in fields(self):
-            section = whole.get(item.name, getattr(self, item.name))
+            section: Any = whole.get(item.name, getattr(self, item.name))
             if is_dataclass(section):
                 own = {part.name for part in fields(section)}
                 known |= dict.fromkeys(own)
                 if own & changes.keys():
-                    whole[item.name] = replace(section, **{key: changes.pop(key) for key in own & changes.keys()})
+                    whole[item.name] = replace(
+                        cast(Any, section), **{key: changes.pop(key) for key in own & changes.keys()}
+                    )
             else:
                 known[item.name] = None
         if changes:
@@ -238,7 +243,7 @@ class Scenario(Section):
 
     def quantities(self) -> dict[str, Any]:
         """Every quantity of every section by name."""
-        flat = {}
+        flat: dict[str, Any] = {}
         for item in fields(self):
             value = getattr(self, item.name)
             flat |= (

@@ -1,6 +1,7 @@
 """How likely nodes detect, for Python."""
 
 import numpy as np
+import numpy.typing as npt
 
 from wsn_env.compiled.kernels import kernel
 from wsn_env.models.detection.base import probability
@@ -14,7 +15,7 @@ def _probabilities(cs, distances, out):
         out[i] = probability(cs[0].detection, cs[0].measurement, distances[i])
 
 
-def detection_probability(distance, scenario: Scenario):
+def detection_probability(distance: npt.ArrayLike, scenario: Scenario) -> np.ndarray:
     """Probability that a node detects the target, by the scenario's detection rule.
 
     Args:
@@ -28,7 +29,7 @@ def detection_probability(distance, scenario: Scenario):
     return out.reshape(distance.shape)
 
 
-def joint_detection_probability(probabilities):
+def joint_detection_probability(probabilities: npt.ArrayLike) -> np.ndarray:
     """Probability that at least one of the nodes detects: 1 - prod(1 - p_i). Xiang & Guo (2013), eq. 4.
 
     Args:

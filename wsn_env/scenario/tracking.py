@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
+from wsn_env.models.measurement.base import Measurement
 from wsn_env.models.quantity import Section, quantity
 
 BOUNDARY_TRACKERS = ("boundary_raw", "boundary", "boundary_mid", "boundary_ekf", "centroid", "centroid_rls")
@@ -24,7 +26,7 @@ STRENGTHS = ("grnn", "grnn_kf")  # trackers that read values of one number
 RANGES = ("trilateration", "nonlinear_ls")  # that turn a value into a distance
 
 
-def reads(tracker: str, measurement) -> bool:
+def reads(tracker: str, measurement: Measurement) -> bool:
     """Whether a tracker can read what a measurement's nodes report."""
     if tracker == "particle":
         return True
@@ -48,7 +50,9 @@ class Tracking(Section):
 
     tracker: str = quantity("particle", " | ".join(TRACKERS), choices=tuple(TRACKERS))
     particles: int = quantity(5000, "number of particles P", at_least=2, at_most=1_000_000, whole=True)
-    fusion: str = quantity("joint", "joint (members send z) or pooled (eqs. 9-15)", choices=("joint", "pooled"))
+    fusion: Literal["joint", "pooled"] = quantity(
+        "joint", "joint (members send z) or pooled (eqs. 9-15)", choices=("joint", "pooled")
+    )
     silent_information: bool = quantity(
         False,
         "weigh with who reported and who kept silent, too (particle only)",
@@ -57,7 +61,7 @@ class Tracking(Section):
     resample_below: float = quantity(
         2 / 3, "resample at N_eff below this share of P (eq. 14); 1: always", at_least=0, at_most=1
     )
-    resampling: str = quantity(
+    resampling: Literal["systematic", "spread"] = quantity(
         "systematic",
         "systematic: copies of the chosen; spread: further copies lie about them in pairs",
         choices=("systematic", "spread"),
@@ -90,7 +94,7 @@ class Tracking(Section):
         above=0,
         optional=True,
     )
-    start: str = quantity(
+    start: Literal["known", "search", "field", "fix"] = quantity(
         "known",
         "known: mean ~ N(truth, P0); search: from a search; field: anywhere; fix: from a fix of the first reports",
         choices=("known", "search", "field", "fix"),
@@ -103,7 +107,7 @@ class Tracking(Section):
     search: bool = quantity(True, "search for lost tracks", choices=(True, False))
     search_miss: float = quantity(1e-3, "search when missing so long was less probable", above=0, at_most=1)
     search_gap: int = quantity(5, "periods between searches, at least", at_least=1, at_most=10**9, whole=True)
-    width_search: str = quantity(
+    width_search: Literal["golden", "foa"] = quantity(
         "golden", "how a fingerprint network's width is found: golden section or fruit flies", choices=("golden", "foa")
     )
     training_seed: int = quantity(

@@ -72,7 +72,7 @@ class Bound:
     `begin` at the start of an episode, then `advance` once a period; `episode_m` and `floor_m` at its end.
     """
 
-    def __init__(self, scenario: Scenario, rows: int = 1, threads: int = 1):
+    def __init__(self, scenario: Scenario, rows: int = 1, threads: int = 1) -> None:
         """Prepare.
 
         Args:
@@ -83,7 +83,7 @@ class Bound:
         if bound_kind(scenario) == "none":
             kind = type(scenario.measurement).__name__
             raise ValueError(f"Scenario.measurement = {kind}: has no Cramer-Rao bound; allowed are all others")
-        self.kind = bound_kind(scenario)
+        self.kind: str = bound_kind(scenario)
         self._periods, self._threads = scenario.periods, threads
         self._constants, self._start = constants(scenario), start_record(scenario)
         self._constants["tracking"]["q"] = process_noise(scenario)
@@ -92,7 +92,7 @@ class Bound:
         self._asked_first = scenario.tracking.start == "search"
         self._memory = np.zeros(rows, MEMORY)
 
-    def begin(self, state: State, rows=None) -> np.ndarray:
+    def begin(self, state: State, rows: np.ndarray | None = None) -> np.ndarray:
         """New episodes; a search in period 0 counts.
 
         Args:
@@ -125,7 +125,7 @@ class Bound:
         """(B,) root of the mean square over the horizon of what `advance` has returned [m]."""
         return np.sqrt(self._memory["squares"] / self._periods)
 
-    def floor_m(self, state: State, rows=None) -> np.ndarray:
+    def floor_m(self, state: State, rows: np.ndarray | None = None) -> np.ndarray:
         """What all nodes would have told, awake throughout: the root of the mean square over the horizon [m].
 
         Args:

@@ -58,7 +58,15 @@ def placed_nodes(scenario: Scenario) -> np.ndarray:
 
 
 @kernel
-def begin(start, stop, starts, rows, keys, placed, handle):
+def begin(
+    start: int,
+    stop: int,
+    starts: np.ndarray,
+    rows: np.ndarray,
+    keys: np.ndarray,
+    placed: np.ndarray,
+    handle: np.ndarray,
+) -> None:
     """Field, batteries, lam and the first belief of new episodes, whose tracks have been drawn."""
     state, s = state_at(handle), starts[0]
     for b in range(start, stop):
@@ -99,7 +107,7 @@ def begin(start, stop, starts, rows, keys, placed, handle):
 class Tracks:
     """Draws the target's track of an episode."""
 
-    def __init__(self, scenario: Scenario):
+    def __init__(self, scenario: Scenario) -> None:
         motion = scenario.motion
         motion.check(scenario)
         self._motion = np.zeros(1, constants_type(motion, scenario))
@@ -107,7 +115,7 @@ class Tracks:
         side_m, depth_m = scenario.field.room_m
         self._course = scenario.period_s, side_m, depth_m, motion.recorded_tracks(scenario)
 
-    def draw(self, rows, keys, tracks, threads: int) -> None:
+    def draw(self, rows: np.ndarray, keys: np.ndarray, tracks: np.ndarray, threads: int) -> None:
         """Fill tracks (B, periods + 1, 4) in the rows marked."""
         over_rows(_draw_tracks, len(rows), threads, self._motion, *self._course, rows, keys, tracks)
 

@@ -1,5 +1,7 @@
 """Which nodes are near: a grid of cells for every field."""
 
+from typing import Any
+
 import numpy as np
 
 from wsn_env.compiled.kernels import lean_kernel, lean_piece, over_rows
@@ -8,7 +10,7 @@ from wsn_env.models.state import network_at
 
 
 @lean_piece
-def index_nodes(positions, grid, b):
+def index_nodes(positions: np.ndarray, grid: Any, b: int) -> None:
     """Sort the nodes (S, 2) of row b into cells, by their numbers within each: a counting sort."""
     place, starts, nodes = grid.row[b], grid.starts[b], grid.nodes[b]
     x0, x1, y0, y1 = np.inf, -np.inf, np.inf, -np.inf
@@ -43,7 +45,7 @@ def _along(offset, place):
 
 
 @lean_piece
-def cells_within(place, x, y, reach_m):
+def cells_within(place: Any, x: float, y: float, reach_m: float) -> tuple[Any, ...]:
     """First and last line, first and last column of the cells that hold every node nearer than this to (x, y)."""
     x, y = x - place.x_m, y - place.y_m
     lines = _along(y - reach_m, place), _along(y + reach_m, place)
@@ -51,7 +53,7 @@ def cells_within(place, x, y, reach_m):
 
 
 @lean_piece
-def nearest_living(positions, battery, x, y):
+def nearest_living(positions: np.ndarray, battery: np.ndarray, x: float, y: float) -> int:
     """The living node nearest to (x, y); the lower index wins a tie; -1: none is alive. Looks at all of them."""
     best, shortest = -1, np.inf
     for i in range(len(battery)):
@@ -62,7 +64,7 @@ def nearest_living(positions, battery, x, y):
 
 
 @lean_piece
-def nearest_candidates(network, b, x, y, nodes, distances):
+def nearest_candidates(network: Any, b: int, x: float, y: float, nodes: np.ndarray, distances: np.ndarray) -> None:
     """The K living nodes of row b nearest to (x, y) in order of distance; the lower index wins a tie.
 
     Looks at rings of cells about the point until none further out can hold a nearer node, so that the time does not
@@ -125,7 +127,9 @@ def _beyond(ring, column, line, x, y, place):
 
 
 @lean_piece
-def ring_candidates(network, b, x, y, ring_m, nodes, distances):
+def ring_candidates(
+    network: Any, b: int, x: float, y: float, ring_m: float, nodes: np.ndarray, distances: np.ndarray
+) -> None:
     """The K living nodes of row b nearest to a ring of this radius [m] about (x, y), in order of that; the lower index
     wins a tie. Looks at all nodes.
 
@@ -152,7 +156,9 @@ def _nearest_rows(start, stop, network_handle, points, ring_m, nodes, distances)
 
 
 @lean_piece
-def find_candidates(network, b, x, y, ring_m, nodes, distances):
+def find_candidates(
+    network: Any, b: int, x: float, y: float, ring_m: float, nodes: np.ndarray, distances: np.ndarray
+) -> None:
     """`nearest_candidates` for a ring of radius 0, else `ring_candidates`."""
     if ring_m > 0.0:
         ring_candidates(network, b, x, y, ring_m, nodes, distances)
@@ -167,12 +173,12 @@ def _index_rows(start, stop, network_handle):
         index_nodes(network.positions[b], network.grid, b)
 
 
-def index(network) -> None:
+def index(network: Any) -> None:
     """Fill the grid of every row by the positions (B, S, 2)."""
     _index_rows(0, len(network.positions), network.handle)
 
 
-def nearest(network, points, count: int, ring_m: float = 0.0, threads: int = 1):
+def nearest(network: Any, points: np.ndarray, count: int, ring_m: float = 0.0, threads: int = 1) -> tuple[Any, ...]:
     """The living nodes nearest to a point, or to a ring about it, for every row.
 
     Args:
@@ -191,7 +197,7 @@ def nearest(network, points, count: int, ring_m: float = 0.0, threads: int = 1):
     return nodes, distances
 
 
-def distances_to(positions, points):
+def distances_to(positions: np.ndarray, points: np.ndarray) -> Any:
     """Distances (B, S) in m of all nodes to one point a row (B, 2)."""
     dx = positions[..., 0] - points[:, None, 0]
     dy = positions[..., 1] - points[:, None, 1]

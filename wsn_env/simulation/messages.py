@@ -7,6 +7,8 @@ them pays for sending, who is called by them pays for hearing it. All pieces wor
 row's record of the period (OUTCOME), `r` the radio's constants.
 """
 
+from typing import Any
+
 import numpy as np
 
 from wsn_env.compiled import draws
@@ -19,7 +21,7 @@ SENSING, HANDOVER, INVITATION, REPORT, BROADCAST, SEARCH = np.arange(6)
 
 
 @lean_piece
-def spend(node, joules, purpose, state, out, b):
+def spend(node: Any, joules: float, purpose: Any, state: Any, out: Any, b: int) -> bool:
     """Charge a node; what it cannot pay empties it. Returns whether it could pay in full."""
     battery, ledger = state.network.battery[b], state.ledger
     before = battery[node]
@@ -36,7 +38,7 @@ def spend(node, joules, purpose, state, out, b):
 
 
 @lean_piece
-def clear_ledger(ledger, b):
+def clear_ledger(ledger: Any, b: int) -> None:
     """Forget the last period's payments."""
     for k in range(ledger.count[b]):
         ledger.spent_j[b, ledger.payer[b, k]] = 0.0
@@ -44,13 +46,13 @@ def clear_ledger(ledger, b):
 
 
 @lean_piece
-def in_one_hop(node, other, positions, r):
+def in_one_hop(node: Any, other: Any, positions: np.ndarray, r: Any) -> bool:
     """Whether a packet goes from node to node at once."""
     return squared_distance(positions, node, positions[other, 0], positions[other, 1]) <= r.hop_m * r.hop_m
 
 
 @lean_piece
-def send(sender, receiver, bits, purpose, state, out, b, r):
+def send(sender: Any, receiver: Any, bits: float, purpose: Any, state: Any, out: Any, b: int, r: Any) -> bool:
     """One packet from node to node (eq. 5). Returns whether both could pay, so that it arrived if not lost."""
     positions, battery = state.network.positions[b], state.network.battery[b]
     squared = squared_distance(positions, sender, positions[receiver, 0], positions[receiver, 1])
@@ -60,7 +62,7 @@ def send(sender, receiver, bits, purpose, state, out, b, r):
 
 
 @lean_piece
-def send_out(sender, x, y, bits, purpose, state, out, b, r):
+def send_out(sender: Any, x: float, y: float, bits: float, purpose: Any, state: Any, out: Any, b: int, r: Any) -> bool:
     """One packet from a node to (x, y), out of the network (eq. 5). Returns whether the node could pay."""
     squared = squared_distance(state.network.positions[b], sender, x, y)
     living = state.network.battery[b, sender] > 0.0
@@ -68,14 +70,14 @@ def send_out(sender, x, y, bits, purpose, state, out, b, r):
 
 
 @lean_piece
-def outside(mean, r):
+def outside(mean: np.ndarray, r: Any) -> tuple[float, float]:
     """Where a receiver outside the network stands, as far as the network knows: the sink in the middle of the field,
     the target where it is predicted. (A price of the true way would tell the target's distance through batteries.)"""
     return (mean[0], mean[2]) if r.to_target else (r.sink_x, r.sink_y)
 
 
 @lean_piece
-def report(node, head, packets, purpose, state, out, b, r):
+def report(node: Any, head: Any, packets: float, purpose: Any, state: Any, out: Any, b: int, r: Any) -> bool:
     """A node's report with its retries. Returns whether it was received; to the head its own is free.
 
     Args:
@@ -107,7 +109,7 @@ def report(node, head, packets, purpose, state, out, b, r):
 
 
 @lean_piece
-def broadcast(state, out, b, r):
+def broadcast(state: Any, out: Any, b: int, r: Any) -> None:
     """The head's word to resample: one transmission as far as the farthest living member, who all pay to hear it."""
     network = state.network
     head, nodes, count = network.row[b].head, network.members[b], network.row[b].n_members
@@ -139,7 +141,7 @@ def _hand_over(old, head, state, out, b, r):
 
 
 @lean_piece
-def take_over(head, state, out, b, r):
+def take_over(head: Any, state: Any, out: Any, b: int, r: Any) -> bool:
     """An awake node leads, alone as yet. Returns whether the head's role was handed over: a sink or the target needs no
     head, so that the node is one like the others there."""
     standing = state.network.row[b]
@@ -150,7 +152,7 @@ def take_over(head, state, out, b, r):
 
 
 @lean_piece
-def form(head, chosen, count, state, out, b, r):
+def form(head: Any, chosen: np.ndarray, count: int, state: Any, out: Any, b: int, r: Any) -> bool:
     """Make the chosen cluster the standing one: handover from the old head, invitations to new members.
 
     Only members that hear their invitation join. A new head invites all of them. A sink or the target calls only who

@@ -1,5 +1,7 @@
 """The parts of a period, a row at a time; `World.step` puts them together."""
 
+from typing import Any
+
 import numpy as np
 
 from wsn_env.compiled import draws
@@ -14,7 +16,17 @@ from wsn_env.simulation.geometry import nearest_living
 
 
 @kernel
-def run(start, stop, cs, maps, heads, chosen, lost, outcomes, handle):
+def run(
+    start: int,
+    stop: int,
+    cs: Any,
+    maps: np.ndarray,
+    heads: np.ndarray,
+    chosen: np.ndarray,
+    lost: np.ndarray,
+    outcomes: np.ndarray,
+    handle: np.ndarray,
+) -> int:
     """A period with the particle filter at the head, up to where some rows must search; returns how many."""
     state, c = state_at(handle), cs[0]
     scratch = make_scratch(state.belief.particles.shape[2])
@@ -33,7 +45,9 @@ def run(start, stop, cs, maps, heads, chosen, lost, outcomes, handle):
 
 
 @kernel
-def foretell_rows(start, stop, cs, rows, maps, belief_handle, positions):
+def foretell_rows(
+    start: int, stop: int, cs: Any, rows: np.ndarray, maps: np.ndarray, belief_handle: np.ndarray, positions: np.ndarray
+) -> None:
     """What each node should report next, in the rows marked, where the measurement says so."""
     belief, c = belief_at(belief_handle), cs[0]
     weights = np.empty(belief.particles.shape[2], np.float32)
@@ -43,7 +57,9 @@ def foretell_rows(start, stop, cs, rows, maps, belief_handle, positions):
 
 
 @lean_kernel
-def sense_and_report(start, stop, cs, heads, chosen, outcomes, handle):
+def sense_and_report(
+    start: int, stop: int, cs: Any, heads: np.ndarray, chosen: np.ndarray, outcomes: np.ndarray, handle: np.ndarray
+) -> None:
     """What comes before the correction, for a tracker that is not compiled."""
     state = state_at(handle)
     for b in range(start, stop):
@@ -51,7 +67,9 @@ def sense_and_report(start, stop, cs, heads, chosen, outcomes, handle):
 
 
 @lean_kernel
-def conclude(start, stop, cs, resampled, lost, outcomes, handle):
+def conclude(
+    start: int, stop: int, cs: Any, resampled: np.ndarray, lost: np.ndarray, outcomes: np.ndarray, handle: np.ndarray
+) -> int:
     """What comes after it; returns how many rows must search."""
     state, count = state_at(handle), 0
     for b in range(start, stop):
@@ -61,7 +79,7 @@ def conclude(start, stop, cs, resampled, lost, outcomes, handle):
 
 
 @lean_piece
-def target_of(state, b):
+def target_of(state: Any, b: int) -> tuple[float, float]:
     """The true position (x, y) in the present period [m]."""
     k = min(state.row[b].period, state.track.shape[1] - 1)
     return state.track[b, k, 0], state.track[b, k, 2]
@@ -155,7 +173,7 @@ def _list_living(chosen, battery, found):
 
 
 @lean_piece
-def wake(node, purpose, state, out, b, r):
+def wake(node: Any, purpose: Any, state: Any, out: Any, b: int, r: Any) -> bool:
     """A node pays for being awake in this period. Returns whether it could."""
     return state.network.battery[b, node] > 0.0 and messages.spend(node, r.awake_j, purpose, state, out, b)
 
@@ -174,7 +192,7 @@ def _sleep(state, out, b, r):
 
 
 @lean_piece
-def sense(node, head, purpose, target, state, out, b, c):
+def sense(node: Any, head: Any, purpose: Any, target: Any, state: Any, out: Any, b: int, c: Any) -> None:
     """An awake node's period: it reports what it has to tell, if anything."""
     if state.network.battery[b, node] <= 0.0:
         return
@@ -197,7 +215,7 @@ def sense(node, head, purpose, target, state, out, b, c):
 
 
 @lean_piece
-def memory_of(state, b):
+def memory_of(state: Any, b: int) -> Any:
     """What a row's nodes and their head keep of states and packets."""
     instant = min(state.row[b].period, state.packets.shape[1] - 1)
     return Memory(state.sensed[b], state.reports.bitmap[b], state.packets[b, instant])
@@ -242,7 +260,7 @@ def _is_lost(state, b, t):
 
 
 @lean_kernel
-def settle(start, stop, cs, rows, outcomes, handle):
+def settle(start: int, stop: int, cs: Any, rows: np.ndarray, outcomes: np.ndarray, handle: np.ndarray) -> None:
     """The end of the period in the rows marked."""
     state = state_at(handle)
     for b in range(start, stop):

@@ -1,5 +1,7 @@
 """The search for a lost target: every living node wakes for the period, and those that detect it tell where it is."""
 
+from typing import Any
+
 import numpy as np
 
 from wsn_env.compiled import draws
@@ -12,7 +14,9 @@ from wsn_env.simulation.period import sense, target_of, wake
 
 
 @lean_kernel
-def search(start, stop, cs, rows, found, outcomes, handle):
+def search(
+    start: int, stop: int, cs: Any, rows: np.ndarray, found: Any, outcomes: np.ndarray, handle: np.ndarray
+) -> None:
     """Every living node wakes for the period; the belief's position restarts at the centroid of those that detect.
 
     Args:

@@ -8,21 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from wsn_env.models.state import Cluster, Grid, Knowledge, State
+from wsn_env.models.state import Cluster, Grid, Knowledge, Network, Reports, State
 from wsn_env.simulation import geometry
 
 HEARING = ("latest_db", "gradient", "variance")  # of a beacon's receivers, what policies ask for
-
-
-def _part(name: str, meaning: str):
-    return property(lambda view: getattr(view.knowledge, name), doc=meaning)
-
-
-def _field(array: str, name: str, meaning: str):
-    return property(lambda view: getattr(view, array)[name], doc=meaning)
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,22 +23,72 @@ class View:
     """The network's knowledge before it chooses the cluster of the next period; all arrays lead with B."""
 
     knowledge: Knowledge
-    _nearest: dict = field(default_factory=dict, repr=False)
+    _nearest: dict[Any, Any] = field(default_factory=dict, repr=False)
 
-    row = _part("row", "(B,) STATE.")
-    belief = _part("belief", "(B,) BELIEF.")
-    network = _part("network", "Nodes, batteries, the standing cluster.")
-    reports = _part("reports", "What the head received in the last period.")
-    receivers = _part("receivers", "(B, S) RECEIVER, where the tracker learns its nodes' errors; else (B, 0).")
+    @property
+    def row(self) -> np.ndarray:
+        """(B,) STATE."""
+        return self.knowledge.row
 
-    period = _field("row", "period", "(B,) periods done.")
-    lam = _field("row", "lam", "(B,) m/mJ.")
-    luck = _field("row", "luck", "(B,) uint32: a random number of the period.")
-    log_miss = _field("row", "log_miss", "(B,) log probability of so long a silence.")
-    mean = _field("belief", "mean", "(B, 4) x, vx, y, vy after the last correction.")
-    cov = _field("belief", "cov", "(B, 4, 4).")
-    predicted_mean = _field("belief", "predicted_mean", "(B, 4) for the period to come.")
-    predicted_cov = _field("belief", "predicted_cov", "(B, 4, 4).")
+    @property
+    def belief(self) -> np.ndarray:
+        """(B,) BELIEF."""
+        return self.knowledge.belief
+
+    @property
+    def network(self) -> Network:
+        """Nodes, batteries, the standing cluster."""
+        return self.knowledge.network
+
+    @property
+    def reports(self) -> Reports:
+        """What the head received in the last period."""
+        return self.knowledge.reports
+
+    @property
+    def receivers(self) -> np.ndarray:
+        """(B, S) RECEIVER, where the tracker learns its nodes' errors; else (B, 0)."""
+        return self.knowledge.receivers
+
+    @property
+    def period(self) -> np.ndarray:
+        """(B,) periods done."""
+        return self.row["period"]
+
+    @property
+    def lam(self) -> np.ndarray:
+        """(B,) m/mJ."""
+        return self.row["lam"]
+
+    @property
+    def luck(self) -> np.ndarray:
+        """(B,) uint32: a random number of the period."""
+        return self.row["luck"]
+
+    @property
+    def log_miss(self) -> np.ndarray:
+        """(B,) log probability of so long a silence."""
+        return self.row["log_miss"]
+
+    @property
+    def mean(self) -> np.ndarray:
+        """(B, 4) x, vx, y, vy after the last correction."""
+        return self.belief["mean"]
+
+    @property
+    def cov(self) -> np.ndarray:
+        """(B, 4, 4)."""
+        return self.belief["cov"]
+
+    @property
+    def predicted_mean(self) -> np.ndarray:
+        """(B, 4) for the period to come."""
+        return self.belief["predicted_mean"]
+
+    @property
+    def predicted_cov(self) -> np.ndarray:
+        """(B, 4, 4)."""
+        return self.belief["predicted_cov"]
 
     @classmethod
     def of(cls, state: State) -> View:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 
 from wsn_env.compiled import kernels
 from wsn_env.compiled.kernels import available_threads, over_rows, threads_for
 from wsn_env.filters import make_tracker
 from wsn_env.filters.particle import ParticleTracker
-from wsn_env.models.state import OUTCOME, Cluster, Grid, Outcome, State
+from wsn_env.models.state import OUTCOME, Cluster, Grid, Outcome, State, Tracker
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import constants
 from wsn_env.simulation import episode, period, search
@@ -19,7 +22,7 @@ LONG_LIST = 64
 class World:
     """A scenario brought to life. Holds no state of its own: every method is a function of its arguments."""
 
-    def __init__(self, scenario: Scenario, threads: int | None = None, fast: bool = False):
+    def __init__(self, scenario: Scenario, threads: int | None = None, fast: bool = False) -> None:
         """Prepare a scenario.
 
         Args:
@@ -29,15 +32,15 @@ class World:
             fast: let the compiler regroup the particle filter's sums: quicker, equal to rounding, but with other bits
                 on other processors. The world itself stays as it is.
         """
-        self.scenario = scenario
-        self.threads = threads or available_threads()
-        self.tracker = make_tracker(scenario, self.threads, fast)
+        self.scenario: Scenario = scenario
+        self.threads: int = threads or available_threads()
+        self.tracker: Tracker = make_tracker(scenario, self.threads, fast)
         self._run = kernels.fast(period.run) if fast else period.run
         self._constants = constants(scenario)
         self._tracks, self._packets = episode.Tracks(scenario), scenario.measurement.packets_of(scenario)
         self._start, self._placed = episode.start_record(scenario), episode.placed_nodes(scenario)
 
-    def reset(self, keys) -> State:
+    def reset(self, keys: npt.ArrayLike) -> State:
         """New episodes.
 
         Args:
@@ -56,7 +59,9 @@ class World:
         state.network.grid.row["side"] = side
         return state
 
-    def restart(self, state: State, rows, keys, donate: bool = False) -> tuple[State, Outcome]:
+    def restart(
+        self, state: State, rows: npt.ArrayLike, keys: npt.ArrayLike, donate: bool = False
+    ) -> tuple[State, Outcome]:
         """New episodes in some rows of a batch; the others stay, but for the ledger of their last period.
 
         Args:
@@ -82,7 +87,8 @@ class World:
             self._search(rows, state, outcome)
         self._in_rows(rows, period.settle, outcome.row, state.handle)
         if self.scenario.measurement.lasting_errors:
-            maps, belief = self.tracker.maps, state.belief
+            tracker: Any = self.tracker  # the particle filter: no other reads errors that last
+            maps, belief = tracker.maps, state.belief
             self._in_rows(rows, period.foretell_rows, maps, belief.handle, state.network.positions)
         return state, outcome
 

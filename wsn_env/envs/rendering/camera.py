@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 from math import ceil
+from typing import Any, Literal
 
 import gymnasium as gym
 import numpy as np
+import numpy.typing as npt
 
 from wsn_env.envs.rendering.frame import frame
 from wsn_env.envs.rendering.plan import SIZE, SMALLEST
@@ -14,6 +16,7 @@ from wsn_env.envs.rendering.trail import Trail
 from wsn_env.models.state import Outcome, State
 from wsn_env.scenario import Scenario
 
+RenderMode = Literal["human", "rgb_array"]
 RENDER_MODES = ("human", "rgb_array")
 FPS = 10
 WIDEST = 1200  # px of a window that shows several rows
@@ -32,16 +35,19 @@ class Camera:
         ValueError: an unknown mode, or a frame that is too small.
     """
 
-    def __init__(self, scenario: Scenario, render_mode: str = "rgb_array", frame_px: int = SIZE, fps: int = FPS):
+    def __init__(
+        self, scenario: Scenario, render_mode: RenderMode = "rgb_array", frame_px: int = SIZE, fps: int = FPS
+    ) -> None:
         if render_mode not in RENDER_MODES:
             raise ValueError(f"render_mode = {render_mode!r}: allowed are None, {', '.join(RENDER_MODES)}")
         if isinstance(frame_px, bool) or not isinstance(frame_px, (int, np.integer)) or frame_px < SMALLEST:
             raise ValueError(f"frame_px = {frame_px!r}: must be a whole number of pixels, at least {SMALLEST}")
-        self.scenario, self.frame_px = scenario, int(frame_px)
-        self._trail: Trail | None = None
+        self.scenario: Scenario = scenario
+        self.frame_px: int = int(frame_px)
+        self._trail: Trail = None  # type: ignore[assignment]  # until episodes have begun
         self._window = Window(f"wsn_env {scenario.name}", fps) if render_mode == "human" else None
 
-    def begin(self, state: State, outcome: Outcome, rows) -> None:
+    def begin(self, state: State, outcome: Outcome, rows: npt.ArrayLike) -> None:
         """Episodes have begun in the rows marked (B,)."""
         if self._trail is None:
             self._trail = Trail.of(state, self.scenario.unscored)
@@ -86,16 +92,18 @@ class Window:
     Without a screen set SDL_VIDEODRIVER=dummy.
     """
 
-    def __init__(self, title: str, fps: int):
+    def __init__(self, title: str, fps: int) -> None:
         if find_spec("pygame") is None:
             raise gym.error.DependencyNotInstalled(
                 "render_mode = 'human' needs pygame: pip install pygame-ce (or 'wsn_env[render]')"
             )
-        self.title, self.fps = title, fps
-        self._screen = self._clock = None
+        self.title: str = title
+        self.fps: int = fps
+        self._screen: Any = None
+        self._clock: Any = None
         self._closed = False
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.title, self.fps)  # a copy opens a window of its own
 
     def show(self, picture: np.ndarray) -> None:
@@ -104,12 +112,13 @@ class Window:
             return
         import pygame
 
-        size = picture.shape[1::-1]
+        size: Any = picture.shape[1::-1]
         if not self._is_shown() or self._screen.get_size() != size:
             pygame.display.init()
             pygame.display.set_caption(self.title)
             self._screen, self._clock = pygame.display.set_mode(size), pygame.time.Clock()
-        self._screen.blit(pygame.image.frombuffer(np.ascontiguousarray(picture), size, "RGB"), (0, 0))
+        pixels: Any = np.ascontiguousarray(picture)
+        self._screen.blit(pygame.image.frombuffer(pixels, size, "RGB"), (0, 0))
         pygame.display.flip()
         self._clock.tick(self.fps)
         if any(event.type == pygame.QUIT for event in pygame.event.get()):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from math import ceil
+from typing import Any
 
 import numpy as np
 
@@ -17,19 +18,20 @@ CIRCLE = np.column_stack([np.cos(TURN), np.sin(TURN)])
 class Canvas:
     """Draws into an image, within its clip. Coordinates are pixels, x to the right and y downward."""
 
-    def __init__(self, image: np.ndarray):
+    def __init__(self, image: np.ndarray) -> None:
         """Take an image.
 
         Args:
             image: (H, W, 3) uint8, drawn into.
         """
         self.image = image
-        self.height, self.width = image.shape[:2]
-        self.clip = (0, 0, self.width, self.height)  # left, top, right, bottom
+        self.height: int = image.shape[0]
+        self.width: int = image.shape[1]
+        self.clip: tuple[int, int, int, int] = (0, 0, self.width, self.height)  # left, top, right, bottom
         self._most = np.zeros(image.shape[:2], np.float32)
         self._steps = np.zeros(self.width + 1, np.float32)
 
-    def discs(self, centres, radius: float, colour, hole: float = -10.0, square: bool = False) -> None:
+    def discs(self, centres: Any, radius: float, colour: str, hole: float = -10.0, square: bool = False) -> None:
         """Discs, rings or squares of one size.
 
         Args:
@@ -42,7 +44,7 @@ class Canvas:
         colours = _numbers(colour).reshape(-1, 3)
         strokes.draw_discs(self.image, self.clip, _points(centres), float(radius), float(hole), square, colours)
 
-    def lines(self, starts, ends, width, colour, opacity=1.0) -> None:
+    def lines(self, starts: Any, ends: Any, width: float, colour: str, opacity: float = 1.0) -> None:
         """Lines with round ends; where they meet they do not darken each other.
 
         Args:
@@ -56,11 +58,11 @@ class Canvas:
         ends = _points(ends)
         strokes.draw_lines(self.image, self._most, self.clip, starts, ends, widths, opacities, _numbers(colour))
 
-    def cloud(self, x, y, weights, colour) -> None:
+    def cloud(self, x: np.ndarray, y: np.ndarray, weights: Any, colour: str) -> None:
         """Points (P,); where they are many, or their weights large, the colour is deeper."""
         strokes.draw_cloud(self.image, self._most, self.clip, *map(_numbers, (x, y, weights, colour)))
 
-    def shade(self, centres, radius: float, tints) -> None:
+    def shade(self, centres: Any, radius: float, tints: Any) -> None:
         """Areas within a radius of any of the centres (N, 2), in the n-th tint (K, 3) where n overlap."""
         strokes.draw_shade(self.image, self._steps, self.clip, _points(centres), float(radius), _numbers(tints))
 
@@ -83,7 +85,7 @@ def text_width(words: str, size: int) -> int:
     return sum(_letter(letter, size).shape[1] for letter in words)
 
 
-def ellipse(centre, axes) -> np.ndarray:
+def ellipse(centre: Any, axes: Any) -> np.ndarray:
     """(65, 2) points on an outline; the last is the first.
 
     Args:

@@ -11,4 +11,5 @@ LINES = (VERMILION, BLUE, GREEN, PURPLE, ORANGE, SKY, BLACK)  # in this order
 
 def rgb(colour: str) -> tuple[int, int, int]:
     """(213, 94, 0) of "#D55E00"."""
-    return tuple(bytes.fromhex(colour[1:]))
+    red, green, blue = bytes.fromhex(colour[1:])
+    return red, green, blue

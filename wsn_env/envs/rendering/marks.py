@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from wsn_env.envs.rendering.canvas import ellipse
 from wsn_env.envs.rendering.palette import CROSS, GREEN, INK, PURPLE
 
 
-def draw_crosses(canvas, centres, reach, width) -> None:
+def draw_crosses(canvas: Any, centres: Any, reach: float, width: float) -> None:
     """Crosses at (N, 2)."""
     for way in (np.array((reach, reach)), np.array((reach, -reach))):
         canvas.lines(centres - way, centres + way, width, CROSS)
 
 
-def draw_arrow(canvas, start, end, width, barb) -> None:
+def draw_arrow(canvas: Any, start: Any, end: Any, width: float, barb: float) -> None:
     """From (2,) to (2,), its head beyond the middle, where no node covers it."""
     along = (end - start) / max(np.hypot(*(end - start)), 1e-9)
     across = np.array((-along[1], along[0]))
@@ -24,13 +26,13 @@ def draw_arrow(canvas, start, end, width, barb) -> None:
     canvas.lines(starts, ends, width, PURPLE)
 
 
-def draw_target(canvas, centre, unit) -> None:
+def draw_target(canvas: Any, centre: Any, unit: float) -> None:
     """A ring."""
     radius = max(6.0 * unit, 3.2)
     canvas.discs(centre, radius, GREEN, hole=radius - max(2.6 * unit, 1.4))
 
 
-def draw_estimate(canvas, centre, unit, axes) -> None:
+def draw_estimate(canvas: Any, centre: Any, unit: float, axes: Any) -> None:
     """A plus in an ellipse, to which `axes` (2, 2) take the unit circle."""
     outline = ellipse(centre, axes)
     arm = max(5.0 * unit, 2.6)

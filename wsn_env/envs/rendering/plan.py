@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,7 +28,7 @@ class Plan(NamedTuple):
     field: tuple[int, int, int, int]  # left, top, right, bottom
     flash: int  # px about the field that a search colours
 
-    def pixels(self, points) -> np.ndarray:
+    def pixels(self, points: np.ndarray) -> np.ndarray:
         """(..., 2) from m."""
         return np.array((self.field[0], self.field[3])) + np.asarray(points) * (self.scale, -self.scale)
 
@@ -86,7 +86,8 @@ def _heard(scenario: Scenario) -> str:
 
 def _flowed(entries, font, width) -> list[list[tuple[int, str, str]]]:
     """Entries of a legend by lines, with the x of each."""
-    lines, x = [[]], font // 2
+    lines: list[list[tuple[int, str, str]]] = [[]]
+    x = font // 2
     for symbol, words in entries:
         wide = round(1.5 * font) + text_width(words, font)
         if x + wide > width:
@@ -142,5 +143,5 @@ def _draw_ruler(canvas, plan, room_m) -> None:
     canvas.text(round(end) + plan.font // 2, y, f"{length:g} m", plan.font, DIM)
 
 
-def widened(box, by: int) -> tuple[int, int, int, int]:
+def widened(box: Any, by: int) -> tuple[int, int, int, int]:
     return box[0] - by, box[1] - by, box[2] + by, box[3] + by

@@ -6,6 +6,8 @@ that must not darken each other where they overlap are first gathered in `most` 
 and after.
 """
 
+from typing import Any
+
 import numpy as np
 
 from wsn_env.compiled.kernels import lean_kernel, lean_piece
@@ -21,7 +23,9 @@ def _mix(image, x, y, share, colour):
 
 
 @lean_kernel
-def draw_discs(image, clip, centres, radius, hole, square, colours):
+def draw_discs(
+    image: np.ndarray, clip: Any, centres: np.ndarray, radius: Any, hole: Any, square: Any, colours: np.ndarray
+) -> None:
     """Discs, rings or squares of one size.
 
     Args:
@@ -45,7 +49,16 @@ def draw_discs(image, clip, centres, radius, hole, square, colours):
 
 
 @lean_kernel
-def draw_lines(image, most, clip, starts, ends, widths, opacities, colour):
+def draw_lines(
+    image: np.ndarray,
+    most: Any,
+    clip: Any,
+    starts: np.ndarray,
+    ends: np.ndarray,
+    widths: np.ndarray,
+    opacities: np.ndarray,
+    colour: Any,
+) -> None:
     """Lines with round ends.
 
     Args:
@@ -83,7 +96,7 @@ def draw_lines(image, most, clip, starts, ends, widths, opacities, colour):
 
 
 @lean_kernel
-def draw_cloud(image, most, clip, x, y, weights, colour):
+def draw_cloud(image: np.ndarray, most: Any, clip: Any, x: Any, y: Any, weights: np.ndarray, colour: Any) -> None:
     """Points of about a pixel; where n of them are the colour's share is n / (1 + n).
 
     Args:
@@ -109,7 +122,7 @@ def draw_cloud(image, most, clip, x, y, weights, colour):
 
 
 @lean_kernel
-def draw_shade(image, steps, clip, centres, radius, tints):
+def draw_shade(image: np.ndarray, steps: Any, clip: Any, centres: np.ndarray, radius: Any, tints: np.ndarray) -> None:
     """Areas within a radius of any centre, in the n-th tint where n overlap. What was drawn there is lost.
 
     Args:

@@ -37,7 +37,7 @@ class Trail:
             unscored=unscored,
         )
 
-    def begin(self, state: State, outcome: Outcome, rows) -> None:
+    def begin(self, state: State, outcome: Outcome, rows: np.ndarray) -> None:
         """Episodes that begin in the rows marked (B,)."""
         self.last.row[rows] = outcome.row[rows]
         self.energy_mj[rows] = outcome.energy_mj[rows]

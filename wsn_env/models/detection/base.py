@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import F, log
 from wsn_env.models.kinds import Kind, by_kind
+
+if TYPE_CHECKING:
+    from wsn_env.models.measurement.base import Measurement
+    from wsn_env.scenario import Scenario
 
 LEAST, MOST = 1e-6, 1.0 - 1e-6  # probabilities as a filter takes them: no report rules a particle out
 POINT = 1.7320508075688772  # sds: Gauss and Hermite's three points
@@ -39,20 +43,20 @@ class DetectionRule(Kind):
 
     values_decide: ClassVar[bool] = False  # whether the measured value decides, so that detecting tells of the value
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """Raise ScenarioError where it does not fit the rest of the scenario."""
 
-    def constants(self, scenario) -> dict[str, float]:
+    def constants(self, scenario: Scenario) -> dict[str, float]:
         """The settings, and the distances."""
         radius_m, reach_m = self.distances_m(scenario.measurement)
         return super().constants(scenario) | {"radius_m": radius_m, "reach_m": reach_m}
 
-    def distances_m(self, measurement) -> tuple[float, float]:
+    def distances_m(self, measurement: Measurement) -> tuple[float, float]:
         """The sensing radius, and the reach, from where on nothing is detected [m]."""
         raise NotImplementedError
 
     @staticmethod
-    def mean_probability(d, m, dx, dy, xx, xy, yy):
+    def mean_probability(d: Any, m: Any, dx: float, dy: float, xx: float, xy: float, yy: float) -> float:
         """`probability` averaged over a target believed to be at (dx, dy) from the node with covariance (xx, xy, yy).
 
         Here by Gauss and Hermite's 3 x 3 points.
@@ -69,18 +73,18 @@ class DetectionRule(Kind):
         return total
 
     @staticmethod
-    def stream_of(d, key, period):
+    def stream_of(d: Any, key: Any, period: int) -> Any:
         """The random numbers that decide who detects in a period."""
         return draws.stream(key, period, draws.DETECTION)
 
     @staticmethod
-    def detects(d, m, stream, number, node, x, y):
+    def detects(d: Any, m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> bool:
         """Whether node `number`, if awake, detects a target at (x, y)."""
         dx, dy = node.x - x, node.y - y
         return draws.uniform(stream, number) < probability(d, m, np.sqrt(dx * dx + dy * dy))
 
     @staticmethod
-    def weigh_detection(d, m, x, log_weights, node):
+    def weigh_detection(d: Any, m: Any, x: np.ndarray, log_weights: np.ndarray, node: Any) -> None:
         """Add to every particle the log probability that the node, which reported, detects a target there."""
         for i in range(x.shape[1]):
             dx, dy = x[0, i] - F(node.x), x[2, i] - F(node.y)
@@ -88,7 +92,7 @@ class DetectionRule(Kind):
             log_weights[i] += F(log(min(max(p, LEAST), MOST)))
 
     @staticmethod
-    def weigh_silence(d, m, x, log_weights, node, delivery):
+    def weigh_silence(d: Any, m: Any, x: np.ndarray, log_weights: np.ndarray, node: Any, delivery: float) -> None:
         """Add log(1 - delivery p(d)): the node was awake and nothing was heard of it.
 
         Args:
@@ -101,12 +105,12 @@ class DetectionRule(Kind):
 
 
 @by_kind
-def probability(d, m, distance):
+def probability(d: Any, m: Any, distance: float) -> Any:
     """Probability that a node detects a target at this distance [m]."""
 
 
-mean_probability = by_kind(DetectionRule.mean_probability)
-stream_of = by_kind(DetectionRule.stream_of)
-detects = by_kind(DetectionRule.detects)
-weigh_detection = by_kind(DetectionRule.weigh_detection)
-weigh_silence = by_kind(DetectionRule.weigh_silence)
+mean_probability: Any = by_kind(DetectionRule.mean_probability)
+stream_of: Any = by_kind(DetectionRule.stream_of)
+detects: Any = by_kind(DetectionRule.detects)
+weigh_detection: Any = by_kind(DetectionRule.weigh_detection)
+weigh_silence: Any = by_kind(DetectionRule.weigh_silence)

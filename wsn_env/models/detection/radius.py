@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from statistics import NormalDist
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -15,13 +15,17 @@ from wsn_env.compiled.kernels import inline_piece, lean_piece
 from wsn_env.models.detection.base import DetectionRule, probability
 from wsn_env.models.quantity import quantity
 
+if TYPE_CHECKING:
+    from wsn_env.models.measurement.base import Measurement
+    from wsn_env.scenario import Scenario
+
 SHARPEST = 1e-6  # m^(2/3): an edge without width would divide by it
 LOG_LEAST, LOG_MOST = F(-13.815510558), F(-1.0000005e-6)  # p in [1e-6, 1 - 1e-6]: no report rules a particle out
 TINY = F(1e-30)
 
 
 @lean_piece
-def detection_curve(d):
+def detection_curve(d: Any) -> tuple[Any, ...]:
     """Eqs. 2-3 in float32 and logarithms: inner and outer end [m], ln l1, b1, b2, ln l2."""
     return (
         F(d.inner_m),
@@ -34,7 +38,7 @@ def detection_curve(d):
 
 
 @inline_piece
-def log_detection32(squared, curve):
+def log_detection32(squared: Any, curve: Any) -> Any:
     """Log of the detection probability at a squared distance [m^2] (eqs. 2-3), clipped to finite odds."""
     inner, reach, log_decay, decay_power, edge_power, log_ceiling = curve
     d = np.sqrt(squared)
@@ -79,18 +83,18 @@ class Detection(DetectionRule):
             near, far = (middle, far) if a1**self.decay_power < wanted * a2**self.edge_power else (near, middle)
         return far
 
-    def distances_m(self, measurement) -> tuple[float, float]:
+    def distances_m(self, measurement: Measurement) -> tuple[float, float]:
         """Sensing radius and reach, whatever is measured."""
         return self.radius_m, self.reach_m
 
-    def constants(self, scenario) -> dict[str, float]:
+    def constants(self, scenario: Scenario) -> dict[str, float]:
         """The settings; and the edge as a normal distribution in the cube root of the squared distance."""
         near, far = (self.distance_m(NormalDist().cdf(sds)) ** (2 / 3) for sds in (1, -1))
         edge = {"edge_root": (near + far) / 2, "edge_width": max((far - near) / 2, SHARPEST)}
         return super().constants(scenario) | edge | {"inner_m": (1 - self.softness) * self.radius_m}
 
     @staticmethod
-    def probability(d, m, distance):
+    def probability(d: Any, m: Any, distance: float) -> float:
         if distance <= d.inner_m:
             return d.ceiling
         if distance >= d.reach_m:
@@ -100,7 +104,7 @@ class Detection(DetectionRule):
         return d.ceiling * exp(-d.decay * exp(d.decay_power * log(a1) - d.edge_power * log(a2)))
 
     @staticmethod
-    def mean_probability(d, m, dx, dy, xx, xy, yy):
+    def mean_probability(d: Any, m: Any, dx: float, dy: float, xx: float, xy: float, yy: float) -> float:
         """The cube root of the squared distance is nearly normal (Wilson & Hilferty, 1931, for this quadratic form).
 
         Over it the edge is taken for a normal distribution function, so that the mean has a closed form: within .02
@@ -111,7 +115,7 @@ class Detection(DetectionRule):
         return d.ceiling * normal_cdf(sds / np.sqrt(1.0 + steepness * steepness * root * root * variance))
 
     @staticmethod
-    def detects(d, m, stream, number, node, x, y):
+    def detects(d: Any, m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> bool:
         dx, dy = node.x - x, node.y - y
         squared = dx * dx + dy * dy
         if squared >= 1.000001 * d.reach_m * d.reach_m:
@@ -120,7 +124,7 @@ class Detection(DetectionRule):
         return uniform < d.ceiling and uniform < probability(d, m, np.sqrt(squared))  # many draws need no eqs. 2-3
 
     @staticmethod
-    def weigh_detection(d, m, x, log_weights, node):
+    def weigh_detection(d: Any, m: Any, x: np.ndarray, log_weights: np.ndarray, node: Any) -> None:
         px, py = x[0], x[2]
         sx, sy = F(node.x), F(node.y)
         curve = detection_curve(d)
@@ -130,7 +134,7 @@ class Detection(DetectionRule):
             log_weights[i] += log_detection32(dx * dx + dy * dy, curve)
 
     @staticmethod
-    def weigh_silence(d, m, x, log_weights, node, delivery):
+    def weigh_silence(d: Any, m: Any, x: np.ndarray, log_weights: np.ndarray, node: Any, delivery: float) -> None:
         px, py = x[0], x[2]
         sx, sy = F(node.x), F(node.y)
         curve = detection_curve(d)
@@ -143,7 +147,7 @@ class Detection(DetectionRule):
 
 
 @lean_piece
-def cube_root(dx, dy, xx, xy, yy):
+def cube_root(dx: float, dy: float, xx: float, xy: float, yy: float) -> tuple[Any, ...]:
     """The cube root of the squared distance to a target believed to be at (dx, dy), as a normal distribution.
 
     Returns: the cube root of the mean squared distance, its mean, and its variance as a share of the root's square.

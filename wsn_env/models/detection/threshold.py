@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -14,6 +14,10 @@ from wsn_env.models.detection.radius import cube_root
 from wsn_env.models.measurement.base import level, level_slope, sample
 from wsn_env.models.measurement.level import FARTHEST_M
 from wsn_env.models.quantity import ScenarioError, quantity
+
+if TYPE_CHECKING:
+    from wsn_env.models.measurement.base import Measurement
+    from wsn_env.scenario import Scenario
 
 LEAST_SDS = 4.753424308822899  # Phi(-this) = 1e-6
 
@@ -32,7 +36,7 @@ class Threshold(DetectionRule):
     allocates: ClassVar[bool] = False
     values_decide: ClassVar[bool] = True
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """Raise ScenarioError unless the mean level falls to the threshold somewhere."""
         self._check_levels(scenario.measurement)
 
@@ -49,20 +53,21 @@ class Threshold(DetectionRule):
                 f" at the source, {low:.4g} and {high:.4g} dB"
             )
 
-    def distances_m(self, measurement) -> tuple[float, float]:
+    def distances_m(self, measurement: Measurement) -> tuple[float, float]:
         """Sensing radius, where the mean level is at the threshold, and reach, where p falls to 1e-6 (taken as 0)."""
         self._check_levels(measurement)
-        weakest = self.threshold_db - LEAST_SDS * measurement.noise_db
-        return measurement.distance_m(self.threshold_db), measurement.distance_m(weakest)
+        levels: Any = measurement
+        weakest = self.threshold_db - LEAST_SDS * levels.noise_db
+        return levels.distance_m(self.threshold_db), levels.distance_m(weakest)
 
     @staticmethod
-    def probability(d, m, distance):
+    def probability(d: Any, m: Any, distance: float) -> float:
         if distance >= d.reach_m:
             return 0.0
         return normal_cdf((level(m, distance * distance) - d.threshold_db) / m.noise)
 
     @staticmethod
-    def mean_probability(d, m, dx, dy, xx, xy, yy):
+    def mean_probability(d: Any, m: Any, dx: float, dy: float, xx: float, xy: float, yy: float) -> float:
         """The mean level is taken for a straight line over the cube root of the squared distance, which is nearly
         normal; so the mean has a closed form."""
         root, mean, variance = cube_root(dx, dy, xx, xy, yy)
@@ -72,19 +77,19 @@ class Threshold(DetectionRule):
         return normal_cdf(sds / np.sqrt(1.0 + steepness * steepness * root * root * variance))
 
     @staticmethod
-    def stream_of(d, key, period):
+    def stream_of(d: Any, key: Any, period: int) -> Any:
         return draws.stream(key, period, draws.MEASUREMENT)  # what decides is the measurement itself
 
     @staticmethod
-    def detects(d, m, stream, number, node, x, y):
+    def detects(d: Any, m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> bool:
         return sample(m, stream, number, node, x, y)[0] > d.threshold_db
 
     @staticmethod
-    def weigh_detection(d, m, x, log_weights, node):
+    def weigh_detection(d: Any, m: Any, x: np.ndarray, log_weights: np.ndarray, node: Any) -> None:
         """A report's value tells all; that it came adds nothing."""
 
     @staticmethod
-    def weigh_silence(d, m, x, log_weights, node, delivery):
+    def weigh_silence(d: Any, m: Any, x: np.ndarray, log_weights: np.ndarray, node: Any, delivery: float) -> None:
         """Add the log probability that nothing was heard of the awake node.
 
         ln Phi((threshold - h(d)) / sigma)               delivery = 1: the level was below the threshold

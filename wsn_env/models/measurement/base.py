@@ -6,7 +6,7 @@ Kernels call the functions at the end of this file with a kind's constants first
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,12 @@ from wsn_env.compiled.kernels import lean_piece
 from wsn_env.models.detection.base import detects, mean_probability, probability, stream_of
 from wsn_env.models.kinds import Kind, by_kind
 from wsn_env.models.quantity import ScenarioError
+from wsn_env.models.state import Sensors
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
+
+Order = Literal["nearest", "information", "value"]  # of merit
 
 EXPECT_AT = 1.7320508075688772  # sds: Gauss and Hermite's three points
 
@@ -87,7 +93,7 @@ class Measurement(Kind):
     reports_state: ClassVar[bool] = False  # whether nodes remember a state and report how it stands
     lasting_errors: ClassVar[bool] = False  # whether errors are alike from period to period, so that silence tells
     # nothing and a tracker has to learn them
-    order: ClassVar[str] = "information"  # the menu's order of merit that suits it
+    order: ClassVar[Order] = "information"  # the menu's order of merit that suits it
     verb: ClassVar[str] = "reported"  # what a node has done that was heard
 
     def check_functions(self) -> None:
@@ -107,10 +113,10 @@ class Measurement(Kind):
         """Lengths of the state's arrays that only some kinds use."""
         return {"states": nodes if self.reports_state else 0, "receivers": nodes if self.lasting_errors else 0}
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """Raise ScenarioError where it does not fit the rest of the scenario."""
 
-    def packets_of(self, scenario):
+    def packets_of(self, scenario: Scenario) -> Any:
         """Where an episode's packets come from, drawn or recorded before it begins; None: there are none."""
         return None
 
@@ -135,7 +141,7 @@ class Measurement(Kind):
         return signal * 10 ** (by_db / 10)
 
     @staticmethod
-    def weigh(m, px, py, log_weights, node, value):
+    def weigh(m: Any, px: np.ndarray, py: np.ndarray, log_weights: np.ndarray, node: Any, value: Any) -> None:
         """Add a report's log likelihood to the log weights of some particles.
 
         Args:
@@ -147,22 +153,24 @@ class Measurement(Kind):
             log_weights[i] += F(log_likelihood(m, first, second, node, px[i], py[i]))
 
     @staticmethod
-    def unwrap(m, value, about):
+    def unwrap(m: Any, value: Any, about: Any) -> Any:
         """The same value, told near another: of an angle, without the jump of a whole turn."""
         return value
 
     @staticmethod
-    def signal(m, stream, number, node, x, y):
+    def signal(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> float:
         """How strong a node finds the target, for the choice of a head after a search: here alike everywhere."""
         return 0.0
 
     @staticmethod
-    def tells(m, key, period, number, node, x, y, c):
+    def tells(m: Any, key: Any, period: int, number: int, node: Any, x: float, y: float, c: Any) -> bool:
         """Whether a node takes the target to be there: here, it detects it."""
         return detects(c.detection, c.measurement, stream_of(c.detection, key, period), number, node, x, y)
 
     @staticmethod
-    def news(m, memory, key, period, number, node, x, y, asked, c):
+    def news(
+        m: Any, memory: Any, key: Any, period: int, number: int, node: Any, x: float, y: float, asked: bool, c: Any
+    ) -> tuple[Any, ...]:
         """What an awake node has to report.
 
         Args:
@@ -177,11 +185,11 @@ class Measurement(Kind):
         return True, value, second, 1.0
 
     @staticmethod
-    def take_note(m, memory, number, value):
+    def take_note(m: Any, memory: Any, number: int, value: Any) -> None:
         """What the head keeps of a report that has come."""
 
     @staticmethod
-    def finds_target(m, memory, reports, head, members, count):
+    def finds_target(m: Any, memory: Any, reports: Any, head: int, members: np.ndarray, count: int) -> bool:
         """Whether anything was heard of the target: here, any report.
 
         Args:
@@ -191,7 +199,16 @@ class Measurement(Kind):
         return reports > 0
 
     @staticmethod
-    def log_miss(m, mean, cov, positions, head, members, count, c):
+    def log_miss(
+        m: Any,
+        mean: np.ndarray,
+        cov: np.ndarray,
+        positions: np.ndarray,
+        head: int,
+        members: np.ndarray,
+        count: int,
+        c: Any,
+    ) -> float:
         """Log of the probability that none of the awake nodes would have been heard, averaged over the belief.
 
         The average is Gauss and Hermite's with 3 x 3 points over the belief's position (exact to degree 5).
@@ -220,27 +237,38 @@ class Measurement(Kind):
         return log(max(total, 1e-300))
 
     @staticmethod
-    def chance(m, node, x, y, xx, xy, yy, c):
+    def chance(m: Any, node: Any, x: float, y: float, xx: float, xy: float, yy: float, c: Any) -> float:
         """Probability that a node has something to report of a target believed to be at (x, y), cov (xx, xy, yy)."""
         return mean_probability(c.detection, c.measurement, x - node.x, y - node.y, xx, xy, yy)
 
     @staticmethod
-    def informs(m, detection):
+    def informs(m: Any, detection: float) -> float:
         """Probability that a node's being awake tells what `linearise` says; here that of its detecting."""
         return detection
 
     @staticmethod
-    def equal_everywhere(m):
+    def equal_everywhere(m: Any) -> bool:
         """Whether a report tells the same wherever its node stands."""
         return False
 
     @staticmethod
-    def packets_a_report(m):
+    def packets_a_report(m: Any) -> float:
         """How many packets long a report is, on average."""
         return 1.0
 
     @staticmethod
-    def weigh_period(m, x, log_weights, belief, network, reports, b, c, maps, scratch):
+    def weigh_period(
+        m: Any,
+        x: np.ndarray,
+        log_weights: np.ndarray,
+        belief: Any,
+        network: Any,
+        reports: Any,
+        b: int,
+        c: Any,
+        maps: np.ndarray,
+        scratch: Any,
+    ) -> None:
         """Weigh the particles with all that row b's head has heard in a period.
 
         Args:
@@ -256,18 +284,18 @@ class Measurement(Kind):
                 weigh(m, x[0], x[2], log_weights, node, value)
 
     @staticmethod
-    def foretell(m, belief, positions, b, c, maps, scratch):
+    def foretell(m: Any, belief: Any, positions: np.ndarray, b: int, c: Any, maps: np.ndarray, scratch: Any) -> None:
         """Note what each node should report in the period to come; only kinds that learn their errors do."""
 
 
 @lean_piece
-def node_at(positions, number):
+def node_at(positions: np.ndarray, number: int) -> Any:
     """A node of a row's positions (S, 2) [m], of whose errors nothing has been learnt."""
     return Node(positions[number, 0], positions[number, 1], Line(0.0, 0.0, 0.0, 0.0))
 
 
 @lean_piece
-def node_of(sensors, number):
+def node_of(sensors: Sensors, number: int) -> Any:
     """A node of a row's Sensors, with what the tracker has learnt of it."""
     positions, learnt = sensors.positions, Line(0.0, 0.0, 0.0, 0.0)
     if len(sensors.receivers) > 0:
@@ -277,41 +305,41 @@ def node_of(sensors, number):
 
 
 @by_kind
-def sample(m, stream, number, node, x, y):
+def sample(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> Any:
     """What a node measures of a target at (x, y), if it detects it: the two numbers of its value."""
 
 
 @by_kind
-def log_likelihood(m, value, second, node, x, y):
+def log_likelihood(m: Any, value: Any, second: Any, node: Any, x: float, y: float) -> Any:
     """Log density of a value that a node has reported, for a particle at (x, y) (float32)."""
 
 
 @by_kind
-def linearise(m, node, x, y, xx, xy, yy):
+def linearise(m: Any, node: Any, x: float, y: float, xx: float, xy: float, yy: float) -> Any:
     """A `Line` for each number of the value, about a target believed to be at (x, y) with covariance (xx, xy, yy)."""
 
 
 @by_kind
-def level(m, squared):
+def level(m: Any, squared: float) -> Any:
     """The mean level [dB] at a squared distance [m^2], for kinds that have one."""
 
 
 @by_kind
-def level_slope(m, squared):
+def level_slope(m: Any, squared: float) -> Any:
     """Its derivative by the distance, over the distance [dB/m^2]; times (dx, dy), its gradient."""
 
 
-weigh = by_kind(Measurement.weigh)
-unwrap = by_kind(Measurement.unwrap)
-signal = by_kind(Measurement.signal)
-tells = by_kind(Measurement.tells)
-news = by_kind(Measurement.news)
-take_note = by_kind(Measurement.take_note)
-finds_target = by_kind(Measurement.finds_target)
-log_miss = by_kind(Measurement.log_miss)
-chance = by_kind(Measurement.chance)
-informs = by_kind(Measurement.informs)
-equal_everywhere = by_kind(Measurement.equal_everywhere)
-packets_a_report = by_kind(Measurement.packets_a_report)
-weigh_period = by_kind(Measurement.weigh_period)
-foretell = by_kind(Measurement.foretell)
+weigh: Any = by_kind(Measurement.weigh)
+unwrap: Any = by_kind(Measurement.unwrap)
+signal: Any = by_kind(Measurement.signal)
+tells: Any = by_kind(Measurement.tells)
+news: Any = by_kind(Measurement.news)
+take_note: Any = by_kind(Measurement.take_note)
+finds_target: Any = by_kind(Measurement.finds_target)
+log_miss: Any = by_kind(Measurement.log_miss)
+chance: Any = by_kind(Measurement.chance)
+informs: Any = by_kind(Measurement.informs)
+equal_everywhere: Any = by_kind(Measurement.equal_everywhere)
+packets_a_report: Any = by_kind(Measurement.packets_a_report)
+weigh_period: Any = by_kind(Measurement.weigh_period)
+foretell: Any = by_kind(Measurement.foretell)

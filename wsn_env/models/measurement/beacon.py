@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from wsn_env.models.measurement.beacon_levels import foretell_levels, weigh_leve
 from wsn_env.models.measurement.beacon_packets import Packets
 from wsn_env.models.quantity import ScenarioError, quantity
 from wsn_env.models.recordings.replay import load_map
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 MAP_LEAVES = 0.15  # of the static field's variance, where a map was made on other days
 
@@ -62,7 +65,7 @@ class Beacon(Measurement):
 
     residual_map: str | None = None  # a file of `wsn calibrate --maps`: the static field as the tracker knows it
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         super().__post_init__()
         for name in ("at_1m_db", "exponents", "heights_m"):
             value = getattr(self, name)
@@ -134,7 +137,7 @@ class Beacon(Measurement):
     lasting_errors: ClassVar[bool] = True
     verb: ClassVar[str] = "has heard"
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """Levels of all receivers, none of what silence or a search would tell."""
         self.of_nodes(scenario.field.nodes)
         tracking = scenario.tracking
@@ -146,7 +149,7 @@ class Beacon(Measurement):
                 " allowed are False and 'joint' with Beacon levels"
             )
 
-    def packets_of(self, scenario) -> Packets:
+    def packets_of(self, scenario: Scenario) -> Packets:
         """Where an episode's packets come from."""
         return Packets(self, scenario)
 
@@ -166,7 +169,7 @@ class Beacon(Measurement):
             )
         return maps
 
-    def constants(self, scenario) -> dict[str, float]:
+    def constants(self, scenario: Scenario) -> dict[str, float]:
         """What the tracker takes levels for."""
         heard = self.heard(scenario.period_s)
         return dict(
@@ -180,49 +183,71 @@ class Beacon(Measurement):
         )
 
     @staticmethod
-    def sample(m, stream, number, node, x, y):
+    def sample(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> tuple[float, float]:
         """An episode's packets are drawn at its start, see `Packets`; `news` finds them."""
         return 0.0, 0.0
 
     @staticmethod
-    def news(m, memory, key, period, number, node, x, y, asked, c):
+    def news(
+        m: Any, memory: Any, key: Any, period: int, number: int, node: Any, x: float, y: float, asked: bool, c: Any
+    ) -> tuple[Any, ...]:
         """A receiver reports the packets that it has heard: their mean level, and how many they are."""
         level, count = memory.packets[number, 0], memory.packets[number, 1]
         return count > 0.0, np.float64(level), np.float64(count), np.float64(count)
 
     @staticmethod
-    def log_miss(m, mean, cov, positions, head, members, count, c):
+    def log_miss(
+        m: Any,
+        mean: np.ndarray,
+        cov: np.ndarray,
+        positions: np.ndarray,
+        head: int,
+        members: np.ndarray,
+        count: int,
+        c: Any,
+    ) -> float:
         """A receiver hears its beacon anywhere."""
         awake = count + (head >= 0)
         return awake * log(max(1.0 - m.heard, 1e-12))
 
     @staticmethod
-    def chance(m, node, x, y, xx, xy, yy, c):
+    def chance(m: Any, node: Any, x: float, y: float, xx: float, xy: float, yy: float, c: Any) -> float:
         """That of hearing any packet."""
         return m.heard
 
     @staticmethod
-    def packets_a_report(m):
+    def packets_a_report(m: Any) -> float:
         """Those that a receiver hears if it hears any."""
         return m.report_packets
 
     @staticmethod
-    def linearise(m, node, x, y, xx, xy, yy):
+    def linearise(m: Any, node: Any, x: float, y: float, xx: float, xy: float, yy: float) -> tuple[Any, ...]:
         """The tracker has said what to expect."""
         own = node.learnt
         return (Line(own.expected, own.slope_x, own.slope_y, max(own.variance, 1e-12)),)
 
     @staticmethod
-    def weigh(m, px, py, log_weights, node, value):
+    def weigh(m: Any, px: np.ndarray, py: np.ndarray, log_weights: np.ndarray, node: Any, value: Any) -> None:
         """Levels are weighed together with their biases, in `weigh_period`."""
 
     @staticmethod
-    def weigh_period(m, x, log_weights, belief, network, reports, b, c, maps, scratch):
+    def weigh_period(
+        m: Any,
+        x: np.ndarray,
+        log_weights: np.ndarray,
+        belief: Any,
+        network: Any,
+        reports: Any,
+        b: int,
+        c: Any,
+        maps: np.ndarray,
+        scratch: Any,
+    ) -> None:
         """The tempered log likelihoods of the reported levels; the biases are corrected by them."""
         weigh_levels(m, x, log_weights, belief, network, reports, b, maps, scratch)
 
     @staticmethod
-    def foretell(m, belief, positions, b, c, maps, scratch):
+    def foretell(m: Any, belief: Any, positions: np.ndarray, b: int, c: Any, maps: np.ndarray, scratch: Any) -> None:
         """What each receiver should report in the period to come, as a line over the predicted positions."""
         t = c.tracking
         way = 0.5 * c.period_s * (1.0 + t.velocity_kept) if t.walks else c.period_s

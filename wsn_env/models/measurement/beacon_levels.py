@@ -6,6 +6,8 @@ so that position is sampled and biases are filtered exactly (Rao and Blackwell).
 second's level for news, and is surer than it may be by a factor of three in the variance.
 """
 
+from typing import Any
+
 import numpy as np
 
 from wsn_env.compiled.arrays import record
@@ -30,7 +32,17 @@ SILENT_DB = -95.0
 
 
 @lean_piece
-def weigh_levels(m, x, log_weights, belief, network, reports, b, maps, scratch):
+def weigh_levels(
+    m: Any,
+    x: np.ndarray,
+    log_weights: np.ndarray,
+    belief: Any,
+    network: Any,
+    reports: Any,
+    b: int,
+    maps: np.ndarray,
+    scratch: Any,
+) -> None:
     """Add the tempered log likelihoods of the reported levels, and correct the biases by them.
 
     Args:
@@ -66,7 +78,7 @@ def weigh_levels(m, x, log_weights, belief, network, reports, b, maps, scratch):
 
 
 @lean_piece
-def expect_fall(px, py, position, receiver, floor, fall):
+def expect_fall(px: np.ndarray, py: np.ndarray, position: Any, receiver: Any, floor: Any, fall: Any) -> None:
     """fall (P,): mean levels at a receiver less that at 1 m, of particles at (px, py)."""
     sx, sy, slope, height = F(position[0]), F(position[1]), F(receiver.slope), F(receiver.height_m2)
     for i in range(len(px)):
@@ -75,7 +87,7 @@ def expect_fall(px, py, position, receiver, floor, fall):
 
 
 @lean_piece
-def add_map(px, py, own_map, fall):
+def add_map(px: np.ndarray, py: np.ndarray, own_map: np.ndarray, fall: Any) -> None:
     """Add what a map says of the particles' cells; outside of it, of the nearest one."""
     per_m = F(1.0 / CELL_M)
     last_x, last_y = own_map.shape[0] - 1, own_map.shape[1] - 1
@@ -94,7 +106,7 @@ def _note_silence(receivers, network, b):
 
 
 @lean_piece
-def draw_biases(biases, ancestors, scratch):
+def draw_biases(biases: np.ndarray, ancestors: np.ndarray, scratch: Any) -> None:
     """Give every particle its ancestor's biases."""
     for j in range(len(biases)):
         own = biases[j]
@@ -105,7 +117,9 @@ def draw_biases(biases, ancestors, scratch):
 
 
 @piece
-def foretell_levels(m, way_s, belief, positions, b, maps, scratch):
+def foretell_levels(
+    m: Any, way_s: float, belief: Any, positions: np.ndarray, b: int, maps: np.ndarray, scratch: Any
+) -> None:
     """What each receiver should report in the period to come, as a line over the predicted positions.
 
     The weighted covariances of position and level over the particles, moved on without noise, give the regression

@@ -5,6 +5,7 @@ recorded go the same way from there.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -31,16 +32,16 @@ BEACON_RECORD = record(
 class Packets:
     """Fills an episode's packets into a state, and what the tracker knows of the receivers."""
 
-    def __init__(self, beacon, scenario):
+    def __init__(self, beacon: Any, scenario: Any) -> None:
         self._beacon = np.zeros(1, BEACON_RECORD)
-        for name in BEACON_RECORD.names:
+        for name in BEACON_RECORD.names or ():
             self._beacon[name] = getattr(beacon, name)
         self._receivers = beacon.of_nodes(scenario.field.nodes)
         self._receivers[:, 1] *= 0.5 * PER_NEPER
         self._recorded = scenario.motion.recorded_packets(scenario)
         self._numbers = scenario.period_s, beacon.bias_db**2
 
-    def fill(self, rows, state, threads: int) -> None:
+    def fill(self, rows: np.ndarray, state: Any, threads: int) -> None:
         """Begin episodes in the rows marked (B,)."""
         own = self._beacon, self._receivers, self._recorded, *self._numbers
         belief = state.belief
@@ -81,7 +82,15 @@ def _fill(
 
 
 @piece
-def draw_packets(key, track, positions, receivers, period_s, c, packets):
+def draw_packets(
+    key: Any,
+    track: np.ndarray,
+    positions: np.ndarray,
+    receivers: np.ndarray,
+    period_s: float,
+    c: Any,
+    packets: np.ndarray,
+) -> None:
     """Fill packets (periods + 1, S, 2) with the mean level and the number of those heard about the end of each period.
 
     A period's packets are those of half a period before its end to half a period after, so that they were sent about

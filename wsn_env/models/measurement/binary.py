@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -11,8 +11,11 @@ from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import F, exp, exp32, log32, normal_cdf
 from wsn_env.compiled.kernels import lean_piece
 from wsn_env.models.detection.base import detects, stream_of
-from wsn_env.models.measurement.base import Line, Measurement, node_at, tells
+from wsn_env.models.measurement.base import Line, Measurement, Order, node_at, tells
 from wsn_env.models.quantity import ScenarioError, quantity
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 TWO_PI = 6.283185307179586
 
@@ -25,7 +28,7 @@ class Binary(Measurement):
     ever sensed, that is 0.
     """
 
-    reports: str = quantity(
+    reports: Literal["changes", "presence"] = quantity(
         "changes",
         "changes: a state that differs from the last one sensed; presence: every 1, in every period",
         choices=("changes", "presence"),
@@ -42,10 +45,10 @@ class Binary(Measurement):
 
     allocates: ClassVar[bool] = False
     reports_state: ClassVar[bool] = True
-    order: ClassVar[str] = "value"
+    order: ClassVar[Order] = "value"
     verb: ClassVar[str] = "detects"
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """A bitmap already tells who keeps silent."""
         if scenario.tracking.silent_information:
             raise ScenarioError(
@@ -57,7 +60,7 @@ class Binary(Measurement):
         """At the edge of detection."""
         return radius_m
 
-    def constants(self, scenario) -> dict[str, float]:
+    def constants(self, scenario: Scenario) -> dict[str, float]:
         """The settings, the disc, and how far the bitmap may be trusted."""
         return dict(
             every_presence=self.reports == "presence",
@@ -70,19 +73,21 @@ class Binary(Measurement):
         )
 
     @staticmethod
-    def sample(m, stream, number, node, x, y):
+    def sample(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> tuple[float, float]:
         """The bit is in `news`: it hangs on detection, and on what the node sensed before."""
         dx, dy = node.x - x, node.y - y
         return (1.0 if dx * dx + dy * dy <= m.radius_m * m.radius_m else 0.0), 0.0
 
     @staticmethod
-    def tells(m, key, period, number, node, x, y, c):
+    def tells(m: Any, key: Any, period: int, number: int, node: Any, x: float, y: float, c: Any) -> bool:
         """It detects, unless it misreads its one bit."""
         misread = m.flip > 0.0 and draws.uniform(draws.stream(key, period, draws.MISREADING), number) < m.flip
         return detects(c.detection, m, stream_of(c.detection, key, period), number, node, x, y) != misread
 
     @staticmethod
-    def news(m, memory, key, period, number, node, x, y, asked, c):
+    def news(
+        m: Any, memory: Any, key: Any, period: int, number: int, node: Any, x: float, y: float, asked: bool, c: Any
+    ) -> tuple[Any, ...]:
         """A node compares what it senses with what it sensed last.
 
         In a search everybody is asked, and silence means 0; so it does where every presence is reported.
@@ -100,12 +105,12 @@ class Binary(Measurement):
         return has_news, np.float64(state), np.float64(changed), 1.0
 
     @staticmethod
-    def take_note(m, memory, number, value):
+    def take_note(m: Any, memory: Any, number: int, value: Any) -> None:
         """The state as last reported."""
         memory.bitmap[number] = value != 0.0
 
     @staticmethod
-    def finds_target(m, memory, reports, head, members, count):
+    def finds_target(m: Any, memory: Any, reports: Any, head: int, members: np.ndarray, count: int) -> bool:
         """States often stay: whether any node that is awake is known to detect."""
         found = head >= 0 and memory.bitmap[head] != 0
         for k in range(count):
@@ -113,12 +118,12 @@ class Binary(Measurement):
         return found
 
     @staticmethod
-    def informs(m, detection):
+    def informs(m: Any, detection: float) -> float:
         """Silence tells as much as a report."""
         return 1.0
 
     @staticmethod
-    def linearise(m, node, x, y, xx, xy, yy):
+    def linearise(m: Any, node: Any, x: float, y: float, xx: float, xy: float, yy: float) -> tuple[Any, ...]:
         """One bit as a linear measurement along the way to the node: the noise leaves the same expected variance.
 
         A normal x of variance v that is only known to lie on one side of a threshold t sds from its mean keeps, on
@@ -135,12 +140,23 @@ class Binary(Measurement):
         return (Line(distance, h0, h1, along * (1.0 - known) / max(known, 1e-12)),)
 
     @staticmethod
-    def weigh(m, px, py, log_weights, node, value):
+    def weigh(m: Any, px: np.ndarray, py: np.ndarray, log_weights: np.ndarray, node: Any, value: Any) -> None:
         """One reported state."""
         _weigh_state(px, py, log_weights, node, value[0] != 0.0, m.flip, m)
 
     @staticmethod
-    def weigh_period(m, x, log_weights, belief, network, reports, b, c, maps, scratch):
+    def weigh_period(
+        m: Any,
+        x: np.ndarray,
+        log_weights: np.ndarray,
+        belief: Any,
+        network: Any,
+        reports: Any,
+        b: int,
+        c: Any,
+        maps: np.ndarray,
+        scratch: Any,
+    ) -> None:
         """Add to every particle the log probability of the awake nodes' states as the bitmap has them: a silent node
         tells as much as one that has reported, but that a report of its own may have been lost.
 

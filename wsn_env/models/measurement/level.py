@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import F, log, log32
 from wsn_env.models.measurement.base import Line, Measurement, level, level_slope
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 FARTHEST_M = 1e7  # as far as a mean level is followed
 
@@ -22,10 +25,20 @@ class Level(Measurement):
     and Gaussian noise of sd `noise_db`.
     """
 
-    exponent: float
     noise_db: float
     floor_m: float
-    absorption_db_per_m: ClassVar[float] = 0.0
+    if TYPE_CHECKING:  # a kind's are constants, quantities or properties
+
+        @property
+        def exponent(self) -> float:
+            """n."""
+
+        @property
+        def absorption_db_per_m(self) -> float:
+            """Further loss with the distance."""
+    else:
+        exponent: float
+        absorption_db_per_m: ClassVar[float] = 0.0
     abstract: ClassVar[bool] = True
     allocates: ClassVar[bool] = False
 
@@ -39,7 +52,7 @@ class Level(Measurement):
         """What the widths of a fingerprint network are counted in [dB]."""
         return self.noise_db / 3
 
-    def constants(self, scenario) -> dict[str, float]:
+    def constants(self, scenario: Scenario) -> dict[str, float]:
         """h as `at_1m - slope ln(max(d, floor_m)^2) - absorption max(d, floor_m)`."""
         slope = 5 * self.exponent / math.log(10)
         return dict(
@@ -70,24 +83,24 @@ class Level(Measurement):
         return signal + by_db
 
     @staticmethod
-    def level(m, squared):
+    def level(m: Any, squared: float) -> float:
         near = max(squared, m.floor_m * m.floor_m, 1e-12)
         return m.at_1m - m.slope * log(near)
 
     @staticmethod
-    def level_slope(m, squared):
+    def level_slope(m: Any, squared: float) -> float:
         if squared < max(m.floor_m * m.floor_m, 1e-12):
             return 0.0
         return -2.0 * m.slope / squared
 
     @staticmethod
-    def sample(m, stream, number, node, x, y):
+    def sample(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> tuple[float, float]:
         noise, _ = draws.normal_pair(stream, number)
         dx, dy = node.x - x, node.y - y
         return level(m, dx * dx + dy * dy) + m.noise * noise, 0.0
 
     @staticmethod
-    def linearise(m, node, x, y, xx, xy, yy):
+    def linearise(m: Any, node: Any, x: float, y: float, xx: float, xy: float, yy: float) -> tuple[Any, ...]:
         dx, dy = x - node.x, y - node.y
         squared = dx * dx + dy * dy
         if xx + yy > 0.0:  # smoothed over the belief's own width, which reaches beyond the floor
@@ -96,13 +109,13 @@ class Level(Measurement):
         return (Line(level(m, squared), slope * dx, slope * dy, m.noise * m.noise),)
 
     @staticmethod
-    def signal(m, stream, number, node, x, y):
+    def signal(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> float:
         noise, _ = draws.normal_pair(stream, number)
         dx, dy = node.x - x, node.y - y
         return level(m, dx * dx + dy * dy) + m.noise * noise
 
     @staticmethod
-    def weigh(m, px, py, log_weights, node, value):
+    def weigh(m: Any, px: np.ndarray, py: np.ndarray, log_weights: np.ndarray, node: Any, value: Any) -> None:
         half_precision = F(0.5 / max(m.noise * m.noise, 1e-20))
         sx, sy, z = F(node.x), F(node.y), F(value[0])
         at_1m, slope, floor = F(m.at_1m), F(m.slope), F(max(m.floor_m * m.floor_m, 1e-12))

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import F
-from wsn_env.models.measurement.base import Line, Measurement
+from wsn_env.models.measurement.base import Line, Measurement, Order
 from wsn_env.models.quantity import quantity
 
 
@@ -21,7 +21,7 @@ class Position(Measurement):
 
     allocates: ClassVar[bool] = False
     values: ClassVar[int] = 2
-    order: ClassVar[str] = "nearest"
+    order: ClassVar[Order] = "nearest"
 
     def fixes(self, values: np.ndarray, places: np.ndarray, radius_m: float) -> tuple[np.ndarray, float]:
         """The reports themselves."""
@@ -33,12 +33,12 @@ class Position(Measurement):
         return 1.0 / np.maximum((offset * offset).sum(axis=-1), 1e-6)
 
     @staticmethod
-    def sample(m, stream, number, node, x, y):
+    def sample(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> tuple[float, float]:
         e0, e1 = draws.normal_pair(stream, number)
         return x + m.noise_m * e0, y + m.noise_m * e1
 
     @staticmethod
-    def weigh(m, px, py, log_weights, node, value):
+    def weigh(m: Any, px: np.ndarray, py: np.ndarray, log_weights: np.ndarray, node: Any, value: Any) -> None:
         half_precision = F(0.5 / max(m.noise_m * m.noise_m, 1e-20))
         zx, zy = F(value[0]), F(value[1])
         for i in range(len(px)):
@@ -47,15 +47,15 @@ class Position(Measurement):
             log_weights[i] -= half_precision * (dx * dx + dy * dy)
 
     @staticmethod
-    def linearise(m, node, x, y, xx, xy, yy):
+    def linearise(m: Any, node: Any, x: float, y: float, xx: float, xy: float, yy: float) -> tuple[Any, ...]:
         variance = m.noise_m * m.noise_m
         return Line(x, 1.0, 0.0, variance), Line(y, 0.0, 1.0, variance)
 
     @staticmethod
-    def signal(m, stream, number, node, x, y):
+    def signal(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> float:
         dx, dy = node.x - x, node.y - y
         return -(dx * dx + dy * dy)
 
     @staticmethod
-    def equal_everywhere(m):
+    def equal_everywhere(m: Any) -> bool:
         return True

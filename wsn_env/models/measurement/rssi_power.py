@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -13,9 +13,12 @@ from wsn_env.compiled.kernels import lean_piece
 from wsn_env.models.measurement.base import Line, Measurement
 from wsn_env.models.quantity import quantity
 
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
+
 
 @lean_piece
-def power(m, squared):
+def power(m: Any, squared: float) -> float:
     """Mean power at a squared distance [m^2]."""
     near = max(squared, m.floor_m * m.floor_m, 1e-12)
     return m.amplitude * exp(-(m.slope * log(near)))
@@ -37,7 +40,7 @@ class RssiPower(Measurement):
         """A third of the noise stands for the decibel."""
         return self.noise / 3
 
-    def constants(self, scenario) -> dict[str, float]:
+    def constants(self, scenario: Scenario) -> dict[str, float]:
         """The mean as `amplitude exp(-slope ln(max(d, floor_m)^2))`."""
         return dict(amplitude=self.amplitude, slope=self.exponent / 2, noise=self.noise, floor_m=self.floor_m)
 
@@ -52,19 +55,19 @@ class RssiPower(Measurement):
         return squared, squared * (2 * self.noise / (self.exponent * powers))
 
     @staticmethod
-    def sample(m, stream, number, node, x, y):
+    def sample(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> tuple[float, float]:
         noise, _ = draws.normal_pair(stream, number)
         dx, dy = node.x - x, node.y - y
         return power(m, dx * dx + dy * dy) + m.noise * noise, 0.0
 
     @staticmethod
-    def signal(m, stream, number, node, x, y):
+    def signal(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> float:
         noise, _ = draws.normal_pair(stream, number)
         dx, dy = node.x - x, node.y - y
         return power(m, dx * dx + dy * dy) + m.noise * noise
 
     @staticmethod
-    def linearise(m, node, x, y, xx, xy, yy):
+    def linearise(m: Any, node: Any, x: float, y: float, xx: float, xy: float, yy: float) -> tuple[Any, ...]:
         dx, dy = x - node.x, y - node.y
         squared = dx * dx + dy * dy
         if xx + yy > 0.0:  # smoothed over the belief's own width, which reaches beyond the floor
@@ -75,7 +78,7 @@ class RssiPower(Measurement):
         return (Line(power(m, squared), slope * dx, slope * dy, m.noise * m.noise),)
 
     @staticmethod
-    def weigh(m, px, py, log_weights, node, value):
+    def weigh(m: Any, px: np.ndarray, py: np.ndarray, log_weights: np.ndarray, node: Any, value: Any) -> None:
         sx, sy = F(node.x), F(node.y)
         slope, floor = F(m.slope), F(max(m.floor_m * m.floor_m, 1e-12))
         log_floor = log32(floor)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -42,18 +43,18 @@ class Sonar(Level):
         return absorption_db_per_km(self.frequency_khz) / 1000
 
     @staticmethod
-    def level(m, squared):
+    def level(m: Any, squared: float) -> float:
         near = max(squared, m.floor_m * m.floor_m, 1e-12)
         return m.at_1m - m.slope * log(near) - m.absorption * np.sqrt(near)
 
     @staticmethod
-    def level_slope(m, squared):
+    def level_slope(m: Any, squared: float) -> float:
         if squared < max(m.floor_m * m.floor_m, 1e-12):
             return 0.0
         return -2.0 * m.slope / squared - m.absorption / np.sqrt(squared)
 
     @staticmethod
-    def weigh(m, px, py, log_weights, node, value):
+    def weigh(m: Any, px: np.ndarray, py: np.ndarray, log_weights: np.ndarray, node: Any, value: Any) -> None:
         half_precision = F(0.5 / max(m.noise * m.noise, 1e-20))
         sx, sy, z = F(node.x), F(node.y), F(value[0])
         at_1m, slope, floor = F(m.at_1m), F(m.slope), F(max(m.floor_m * m.floor_m, 1e-12))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,10 @@ from wsn_env.compiled.elementary import HALF_PI, sincos
 from wsn_env.compiled.kernels import lean_piece, piece
 from wsn_env.models.kinds import Kind, by_kind
 from wsn_env.models.quantity import ScenarioError
+
+if TYPE_CHECKING:
+    from wsn_env.models.measurement.base import Measurement
+    from wsn_env.scenario import Scenario
 
 
 class Course(NamedTuple):
@@ -45,21 +49,21 @@ class Motion(Kind):
         """sd of the track's own white acceleration; None: it has none, and turns as it likes."""
         return None
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """Raise ScenarioError where field or horizon leave it no room; asked when a world is made."""
 
-    def check_measurement(self, measurement) -> None:
+    def check_measurement(self, measurement: Measurement) -> None:
         """Raise ScenarioError where nodes must measure something else; asked when a scenario is made."""
 
     def horizon(self, period_s: float) -> int | None:
         """How many periods it lasts; None: as many as one likes."""
         return None
 
-    def recorded_tracks(self, scenario) -> np.ndarray:
+    def recorded_tracks(self, scenario: Scenario) -> np.ndarray:
         """(N, periods + 1, 4) tracks that are known beforehand."""
         return np.zeros((0, scenario.periods + 1, 4))
 
-    def recorded_packets(self, scenario) -> np.ndarray:
+    def recorded_packets(self, scenario: Scenario) -> np.ndarray:
         """(periods + 1, S, 2) packets that were recorded with the track; (0, 0, 2): none."""
         return np.zeros((0, 0, 2), np.float32)
 
@@ -68,12 +72,12 @@ class Motion(Kind):
 
 
 @by_kind
-def draw(m, stream, course, track):
+def draw(m: Any, stream: Any, course: Any, track: np.ndarray) -> Any:
     """Fill `track` (periods + 1, 4) with the true states."""
 
 
 @piece
-def reflect(state, axis, side_m):
+def reflect(state: Any, axis: int, side_m: float) -> None:
     """Fold a coordinate back into [0, side], as a mirror at the border would."""
     x = state[axis] - 2.0 * side_m * np.floor(state[axis] / (2.0 * side_m))
     if x > side_m:
@@ -83,7 +87,7 @@ def reflect(state, axis, side_m):
 
 
 @piece
-def heading_of(s, c):
+def heading_of(s: float, c: Any) -> float:
     """The angle in (-pi, pi] of a unit vector, by Newton's steps from the octant (no libm)."""
     angle = 0.0
     if c < 0.0:
@@ -97,6 +101,6 @@ def heading_of(s, c):
 
 
 @lean_piece
-def set_state(state, x, vx, y, vy):
+def set_state(state: Any, x: float, vx: float, y: float, vy: float) -> None:
     """Write a true state (4,)."""
     state[0], state[1], state[2], state[3] = x, vx, y, vy

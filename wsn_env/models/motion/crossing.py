@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.models.motion.base import Motion, set_state
 from wsn_env.models.motion.prediction import advance
 from wsn_env.models.quantity import quantity
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 TRIES = 100
 
@@ -32,7 +37,7 @@ class Crossing(Motion):
         """That of the settings."""
         return self.acceleration_ms2
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """The end points must find room."""
         side = scenario.field.side_m
         room = (side - 2 * self.margin_m) * 2**0.5
@@ -43,7 +48,7 @@ class Crossing(Motion):
             raise self._limit("crossing_m", allowed)
 
     @staticmethod
-    def draw(m, stream, course, track):
+    def draw(m: Any, stream: Any, course: Any, track: np.ndarray) -> None:
         steps = len(track) - 1
         inner = course.side_m - 2.0 * m.margin_m
         draw = 0

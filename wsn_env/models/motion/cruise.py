@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import HALF_PI, sincos
 from wsn_env.models.motion.base import Motion, set_state
 from wsn_env.models.motion.prediction import advance
 from wsn_env.models.quantity import quantity
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 TRIES = 1000
 
@@ -35,7 +40,7 @@ class Cruise(Motion):
         """That of the settings."""
         return self.acceleration_ms2
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """Starts must find room, and the margin must be out of reach."""
         side = scenario.field.side_m
         if self.inset_m < self.margin_m or self.inset_m >= side / 2:
@@ -46,7 +51,7 @@ class Cruise(Motion):
             raise self._limit("speed_ms", allowed)
 
     @staticmethod
-    def draw(m, stream, course, track):
+    def draw(m: Any, stream: Any, course: Any, track: np.ndarray) -> None:
         steps = len(track) - 1
         inner, first = course.side_m - 2.0 * m.inset_m, 0
         for attempt in range(2 * TRIES):  # the first that stays inside; after TRIES without noise

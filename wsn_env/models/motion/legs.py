@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from wsn_env.models.motion.recorded import RecordedMotion
 from wsn_env.models.quantity import ScenarioError
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -24,7 +27,7 @@ class Legs(RecordedMotion):
     start_m: tuple[float, float] = (5.0, 5.0)  # x, y
     legs: tuple[tuple[float, float, float], ...] = ((100.0, 0.9, 0.9),)  # s, m/s along x, m/s along y
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         super().__post_init__()
         start = self._finite("start_m", (2,), "a finite pair (x, y) in m")
         legs = self._finite("legs", (-1, 3), "finite triples (seconds, vx, vy) in s and m/s, at least one")
@@ -71,6 +74,6 @@ class Legs(RecordedMotion):
         track[:, 1::2] = legs[leg, 1:]
         return track
 
-    def recorded_tracks(self, scenario) -> np.ndarray:
+    def recorded_tracks(self, scenario: Scenario) -> np.ndarray:
         """The one."""
         return self._track(scenario)[None]

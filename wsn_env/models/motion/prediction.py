@@ -1,12 +1,16 @@
 """The filter's motion: the target goes on, but for noise; at constant velocity (eqs. 6, 8), or walking in a room."""
 
+from typing import Any
+
+import numpy as np
+
 from wsn_env.compiled.kernels import lean_piece, piece
 
 ROUGHENING_M = 0.05  # what a walker's position is uncertain by beside its velocity
 
 
 @piece
-def advance(state, period_s, ax, ay, out):
+def advance(state: Any, period_s: float, ax: float, ay: float, out: np.ndarray) -> None:
     """Constant velocity with a constant acceleration over the period: F x + G a (eqs. 6, 8)."""
     half = 0.5 * period_s * period_s
     out[0] = state[0] + period_s * state[1] + half * ax
@@ -16,7 +20,9 @@ def advance(state, period_s, ax, ay, out):
 
 
 @lean_piece
-def predict_moments(mean, cov, t, q, predicted_mean, predicted_cov):
+def predict_moments(
+    mean: np.ndarray, cov: np.ndarray, t: Any, q: float, predicted_mean: np.ndarray, predicted_cov: np.ndarray
+) -> None:
     """F x and F P F' + q^2 G G' (eq. 16).
 
     Differs from the paper: as printed, eq. 16 leaves out the spread of the particles, so that E would be constant.
@@ -27,7 +33,7 @@ def predict_moments(mean, cov, t, q, predicted_mean, predicted_cov):
 
 
 @lean_piece
-def predict_covariance(cov, t, q, predicted_cov):
+def predict_covariance(cov: np.ndarray, t: Any, q: float, predicted_cov: np.ndarray) -> None:
     """F P F' + q^2 G G'; also in place, since every entry is made of itself and of later ones."""
     for i in range(4):
         for j in range(4):
@@ -47,7 +53,9 @@ def predict_covariance(cov, t, q, predicted_cov):
 
 
 @lean_piece
-def predict_walk(mean, cov, t, predicted_mean, predicted_cov):
+def predict_walk(
+    mean: np.ndarray, cov: np.ndarray, t: Any, predicted_mean: np.ndarray, predicted_cov: np.ndarray
+) -> None:
     """F x and F P F' + Q of a walker: v' = a v + sd sqrt(1 - a^2) e, x' = x + T (v + v') / 2; without walls."""
     a, half = t.velocity_kept, 0.5 * t.period_s
     way = half * (1.0 + a)

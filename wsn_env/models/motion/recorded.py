@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from wsn_env.compiled import draws
 from wsn_env.models.motion.base import Motion
 from wsn_env.models.quantity import ScenarioError, quantity
 from wsn_env.models.recordings.tracks import read_track
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -21,7 +24,7 @@ class RecordedMotion(Motion):
     abstract: ClassVar[bool] = True
 
     @staticmethod
-    def draw(m, stream, course, track):
+    def draw(m: Any, stream: Any, course: Any, track: np.ndarray) -> None:
         """One of them, by the episode's key."""
         track[:] = course.recorded[int(draws.uniform(stream, 0) * len(course.recorded))]
 
@@ -38,13 +41,13 @@ class Recorded(RecordedMotion):
     tracks: tuple[str, ...] = ()
     span_m: float | None = quantity(80.0, "scale to this extent and centre; None: as recorded", above=0, optional=True)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         names = (self.tracks,) if isinstance(self.tracks, (str, Path)) else self.tracks
         object.__setattr__(self, "tracks", tuple(str(name) for name in names))
         if not self.tracks:
             raise ScenarioError("Recorded.tracks = (): must name at least one CSV file with columns t, x, y")
         super().__post_init__()
 
-    def recorded_tracks(self, scenario) -> np.ndarray:
+    def recorded_tracks(self, scenario: Scenario) -> np.ndarray:
         """One of each file."""
         return np.stack([read_track(path, self.span_m, scenario) for path in self.tracks])

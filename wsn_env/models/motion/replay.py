@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from wsn_env.models.motion.recorded import RecordedMotion
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.models.recordings.replay import periods_of, receivers_of, recorded
+
+if TYPE_CHECKING:
+    from wsn_env.models.measurement.base import Measurement
+    from wsn_env.scenario import Scenario
 
 SAME_PLACE_M = 0.05
 
@@ -25,13 +29,13 @@ class Replay(RecordedMotion):
     fitting_q: ClassVar[float] = 0.2
     recording: str = ""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         object.__setattr__(self, "recording", str(self.recording))
         if not self.recording:
             raise ScenarioError("Replay.recording = '': must name a file such as straight_01_all_sensors.mbd")
         super().__post_init__()
 
-    def check_measurement(self, measurement) -> None:
+    def check_measurement(self, measurement: Measurement) -> None:
         """Packets are for receivers of a beacon."""
         if not measurement.lasting_errors:
             raise ScenarioError(
@@ -68,13 +72,13 @@ class Replay(RecordedMotion):
             track[:, axis + 1] = np.gradient(track[:, axis], scenario.period_s) if scenario.periods > 0 else 0.0
         return track
 
-    def recorded_packets(self, scenario) -> np.ndarray:
+    def recorded_packets(self, scenario: Scenario) -> np.ndarray:
         """Mean level [dBm] and number of the packets that each receiver recorded: none in period 0."""
         levels, counts, _ = recorded(self.recording, scenario.period_s)
         packets = np.zeros((scenario.periods + 1, levels.shape[1], 2), np.float32)
         packets[1:, :, 0], packets[1:, :, 1] = levels[: scenario.periods], counts[: scenario.periods]
         return packets
 
-    def recorded_tracks(self, scenario) -> np.ndarray:
+    def recorded_tracks(self, scenario: Scenario) -> np.ndarray:
         """The one."""
         return self._track(scenario)[None]

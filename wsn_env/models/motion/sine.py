@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
 
 from wsn_env.compiled.elementary import HALF_PI, sincos
 from wsn_env.models.motion.base import Motion, set_state
 from wsn_env.models.quantity import quantity
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -20,7 +25,7 @@ class Sine(Motion):
     amplitude_m: float = quantity(25.0, "swing along y", at_least=0)
     turn_s: float = quantity(100.0, "time of one wave", above=0)
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """The wave must fit the field and the period."""
         if self.turn_s < scenario.period_s:
             raise self._limit("turn_s", f"at least a period, {scenario.period_s} s")
@@ -28,7 +33,7 @@ class Sine(Motion):
             raise self._limit("amplitude_m", f"at most half the side, {scenario.field.side_m / 2} m")
 
     @staticmethod
-    def draw(m, stream, course, track):
+    def draw(m: Any, stream: Any, course: Any, track: np.ndarray) -> None:
         w = 4.0 * HALF_PI / m.turn_s
         for k in range(len(track)):
             t = k * course.period_s

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
+
+import numpy as np
 
 from wsn_env.models.motion.base import Motion, set_state
 from wsn_env.models.quantity import quantity
@@ -19,7 +21,7 @@ class Straight(Motion):
     velocity_ms: float = quantity(0.9, "velocity, both axes")
 
     @staticmethod
-    def draw(m, stream, course, track):
+    def draw(m: Any, stream: Any, course: Any, track: np.ndarray) -> None:
         for k in range(len(track)):
             x = m.from_m + m.velocity_ms * course.period_s * k
             set_state(track[k], x, m.velocity_ms, x, m.velocity_ms)

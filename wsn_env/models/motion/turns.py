@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import HALF_PI, sincos
 from wsn_env.models.motion.base import Motion, heading_of, reflect
 from wsn_env.models.motion.prediction import advance
 from wsn_env.models.quantity import quantity
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -20,14 +25,14 @@ class Turns(Motion):
     speed_ms: float = quantity(1.0, "speed", above=0)
     turn_probability: float = quantity(0.1, "probability of a turn in a period", at_least=0, at_most=1)
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """At most a side in a period."""
         fastest = scenario.field.side_m / scenario.period_s
         if self.speed_ms > fastest:
             raise self._limit("speed_ms", f"at most {fastest} m/s, a side of the field in a period")
 
     @staticmethod
-    def draw(m, stream, course, track):
+    def draw(m: Any, stream: Any, course: Any, track: np.ndarray) -> None:
         track[0, 0] = course.side_m * (0.1 + 0.8 * draws.uniform(stream, 0))
         track[0, 2] = course.side_m * (0.1 + 0.8 * draws.uniform(stream, 1))
         heading = 4.0 * HALF_PI * draws.uniform(stream, 2)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.models.motion.base import Motion, set_state
 from wsn_env.models.quantity import ScenarioError, quantity
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -22,12 +25,12 @@ class Walk(Motion):
     fastest_ms: float = quantity(0.73, "greatest speed of a leg", above=0)
     margin_m: float = quantity(1.0, "goals keep this distance from the walls", at_least=0)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         super().__post_init__()
         if self.slowest_ms > self.fastest_ms:
             raise ScenarioError(f"Walk.slowest_ms = {self.slowest_ms}: must be at most fastest_ms = {self.fastest_ms}")
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """The goals must find room, and no leg may leave it in a period."""
         room = min(scenario.field.room_m)
         if self.margin_m >= room / 2:
@@ -36,7 +39,7 @@ class Walk(Motion):
             raise self._limit("fastest_ms", f"at most {room / scenario.period_s} m/s")
 
     @staticmethod
-    def draw(m, stream, course, track):
+    def draw(m: Any, stream: Any, course: Any, track: np.ndarray) -> None:
         width, depth = course.side_m - 2.0 * m.margin_m, course.depth_m - 2.0 * m.margin_m
         x = m.margin_m + width * draws.uniform(stream, 0)
         y = m.margin_m + depth * draws.uniform(stream, 1)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.models.motion.base import Motion, set_state
 from wsn_env.models.quantity import quantity
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -20,14 +23,14 @@ class Waypoint(Motion):
     fitting_q: ClassVar[float] = 0.2
     speed_ms: float = quantity(1.0, "speed", above=0)
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """At most a side in a period."""
         fastest = scenario.field.side_m / scenario.period_s
         if self.speed_ms > fastest:
             raise self._limit("speed_ms", f"at most {fastest} m/s, a side of the field in a period")
 
     @staticmethod
-    def draw(m, stream, course, track):
+    def draw(m: Any, stream: Any, course: Any, track: np.ndarray) -> None:
         x = course.side_m * draws.uniform(stream, 0)
         y = course.side_m * draws.uniform(stream, 1)
         goal_x = course.side_m * draws.uniform(stream, 2)

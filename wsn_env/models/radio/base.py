@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
 from wsn_env.models.kinds import Kind, by_kind
 from wsn_env.models.quantity import quantity
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 RECEIVERS = ("head", "sink", "target")
 
@@ -35,14 +38,14 @@ class Link(Kind):
     handover_bits: int = quantity(448, "the estimate, from old to new head", at_least=0, whole=True)
     wakeup_bits: int = quantity(128, "the wake-up of a search, paid by its receivers", at_least=0, whole=True)
     broadcast_bits: int = quantity(32, "the head's word to resample", at_least=0, whole=True)
-    handover: str = quantity(
+    handover: Literal["estimate", "particles"] = quantity(
         "estimate",
         "what is handed over: the estimate (handover_bits) or every particle",
         choices=("estimate", "particles"),
     )
     packet_success: float = quantity(1.0, "probability that one try of a report arrives", at_least=0, at_most=1)
     retries: int = quantity(3, "further tries of a lost report", at_least=0, at_most=15, whole=True)
-    receiver: str = quantity(
+    receiver: Literal["head", "sink", "target"] = quantity(
         "head",
         "who hears the awake nodes: the cluster's head; a sink on mains in the middle of the field; the target's own"
         " node, which hears their beacons",
@@ -50,10 +53,28 @@ class Link(Kind):
     )
     battery_j: float = quantity(1.0, "a node's energy at the start", above=0)
 
-    hop_m: ClassVar[float] = math.inf  # no packet goes farther at once
-    tx_j_per_bit: ClassVar[float]  # sending, whatever the distance
-    amplifier_j_per_bit_m2: ClassVar[float] = 0.0  # sending, times distance squared
-    rx_j_per_bit: ClassVar[float]  # receiving
+    if TYPE_CHECKING:  # a kind's are constants, quantities or properties
+
+        @property
+        def hop_m(self) -> float:
+            """No packet goes farther at once."""
+
+        @property
+        def tx_j_per_bit(self) -> float:
+            """Sending, whatever the distance."""
+
+        @property
+        def amplifier_j_per_bit_m2(self) -> float:
+            """Sending, times distance squared."""
+
+        @property
+        def rx_j_per_bit(self) -> float:
+            """Receiving."""
+    else:
+        hop_m: ClassVar[float] = math.inf  # no packet goes farther at once
+        tx_j_per_bit: ClassVar[float]  # sending, whatever the distance
+        amplifier_j_per_bit_m2: ClassVar[float] = 0.0  # sending, times distance squared
+        rx_j_per_bit: ClassVar[float]  # receiving
 
     @property
     def delivery(self) -> float:
@@ -75,10 +96,10 @@ class Link(Kind):
         """Energy of receiving: bits e_r."""
         return bits * self.rx_j_per_bit
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """Raise ScenarioError where it does not fit the rest of the scenario."""
 
-    def constants(self, scenario) -> dict[str, float]:
+    def constants(self, scenario: Scenario) -> dict[str, float]:
         """Sizes, prices and probabilities; who receives, and where a sink stands."""
         width_m, depth_m = scenario.field.room_m
         return dict(
@@ -112,22 +133,22 @@ class Link(Kind):
         return 0.0
 
     @staticmethod
-    def transmission(r, bits, squared):
+    def transmission(r: Any, bits: float, squared: float) -> float:
         """Energy of sending `bits` over a squared distance [J]: bits (e1 + e2 d^2), eq. 5."""
         return bits * (r.tx_j_per_bit + r.amplifier_j_per_bit_m2 * squared)
 
     @staticmethod
-    def reception(r, bits):
+    def reception(r: Any, bits: float) -> float:
         """Energy of receiving `bits` [J]: bits e_r."""
         return bits * r.rx_j_per_bit
 
     @staticmethod
-    def relayed(r, bits, squared):
+    def relayed(r: Any, bits: float, squared: float) -> float:
         """`transmission` over as many hops as it takes, with what the relays pay for receiving."""
         hops = max(np.ceil(np.sqrt(squared) / r.hop_m), 1.0)
         return hops * transmission(r, bits, squared) + (hops - 1.0) * reception(r, bits)
 
 
-transmission = by_kind(Link.transmission)
-reception = by_kind(Link.reception)
-relayed = by_kind(Link.relayed)
+transmission: Any = by_kind(Link.transmission)
+reception: Any = by_kind(Link.reception)
+relayed: Any = by_kind(Link.relayed)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from wsn_env.models.quantity import quantity
 from wsn_env.models.radio.base import RECEIVERS, Link
@@ -19,7 +20,7 @@ class Bluetooth(Link):
     transmit_w: float = quantity(0.0159, "power while sending", at_least=0)
     listen_w: float = quantity(0.0162, "power while listening or receiving", at_least=0)
     bit_rate: float = quantity(1e6, "bits a second", above=0)
-    receiver: str = quantity("sink", "who hears the awake nodes", choices=RECEIVERS)
+    receiver: Literal["head", "sink", "target"] = quantity("sink", "who hears the awake nodes", choices=RECEIVERS)
     report_bits: int = quantity(128, "what is passed on of a packet", at_least=0, whole=True)
     invitation_bits: int = quantity(0, "an invitation to a new member", at_least=0, whole=True)
     battery_j: float = quantity(20_000.0, "a node's energy at the start: two alkaline AA cells", above=0)

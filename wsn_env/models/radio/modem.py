@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
 
 from wsn_env.models.quantity import ScenarioError, quantity
 from wsn_env.models.radio.base import Link
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -28,7 +32,7 @@ class Modem(Link):
     listen_w: float = quantity(0.0125, "power of an awake node", at_least=0)
     sleep_w: float = quantity(0.0002, "power of a sleeping node", at_least=0)
     bit_rate: float = quantity(640.0, "bits a second", above=0)
-    receiver: str = quantity("head", "who hears the awake nodes: the cluster's head", choices=("head",))
+    receiver: Literal["head"] = quantity("head", "who hears the awake nodes: the cluster's head", choices=("head",))
     hop_m: float = quantity(250.0, "range of a transmission", above=0)
     sound_ms: float = quantity(1500.0, "speed of sound", above=0)
     report_bits: int = quantity(64, "a member's report", at_least=0, whole=True)
@@ -60,7 +64,7 @@ class Modem(Link):
         """Sleeping."""
         return self.sleep_w * period_s
 
-    def check(self, scenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """A report must arrive within a period."""
         if scenario.period_s < self.report_s:
             raise ScenarioError(

@@ -206,8 +206,8 @@ def _sections(path: Path) -> dict[str, tuple[int, str]]:
     """Line and text of every NAME:{...}, which may go on in further lines."""
     texts: dict[str, tuple[int, list[str]]] = {}
     name = None
-    for number, line in enumerate(_read(path).splitlines(), 1):
-        line = line.decode(errors="replace")
+    for number, raw in enumerate(_read(path).splitlines(), 1):
+        line = raw.decode(errors="replace")
         if found := SECTION.fullmatch(line):
             name, rest = found.groups()
             if name in texts:
@@ -385,7 +385,8 @@ def _parse(line: bytes) -> tuple[float, bytes, bytes, float, float, float, float
         raise ValueError("its numbers are not all finite")
     if b"_" in line and any(b"_" in field for field in (fields[0], *fields[3:])):
         raise ValueError("an underscore in a number")
-    return time, fields[1].strip(), fields[2].strip(), level, *rest[:3]
+    x, y, z = rest[:3]
+    return time, fields[1].strip(), fields[2].strip(), level, x, y, z
 
 
 def _is_number(field: bytes) -> bool:

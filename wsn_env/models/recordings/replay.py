@@ -22,7 +22,7 @@ CALIBRATED = (  # quantities of a calibration, all of them
 ).split()
 
 
-def recorded(path: str | Path, period_s: float):
+def recorded(path: str | Path, period_s: float) -> Any:
     """A recording by periods: levels (K, S) [dBm], numbers of packets (K, S), positions (K, 2) [m].
 
     Raises:
@@ -37,7 +37,7 @@ def periods_of(path: str | Path, period_s: float) -> int:
     return len(recorded(path, period_s)[0])
 
 
-def receivers_of(path: str | Path):
+def receivers_of(path: str | Path) -> Any:
     """Where the receivers of a recording stand: (S, 3) m."""
     with _named(path):
         return _read(str(path), *_stamps(path)).receivers.positions_m

@@ -1,13 +1,14 @@
 """Recorded tracks from CSV files."""
 
 import csv
+from typing import Any
 
 import numpy as np
 
 from wsn_env.models.quantity import ScenarioError
 
 
-def read_track(path: str, span_m: float | None, scenario) -> np.ndarray:
+def read_track(path: str, span_m: float | None, scenario: Any) -> np.ndarray:
     """A recorded track (periods + 1, 4), resampled linearly to the horizon, scaled and centred on request.
 
     Args:
@@ -17,7 +18,8 @@ def read_track(path: str, span_m: float | None, scenario) -> np.ndarray:
     Raises:
         ScenarioError: names the file, the line and what is allowed.
     """
-    times, points = [], []
+    times: list[float] = []
+    points: list[tuple[float, float]] = []
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
             table = csv.DictReader(file, skipinitialspace=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import floor
+from typing import Any, Literal
 
 import numpy as np
 
@@ -31,7 +32,7 @@ class System:
 
     tracker: str
     inside: bool = False
-    reports: str = "changes"
+    reports: Literal["changes", "presence"] = "changes"
     tracking: tuple[tuple[str, object], ...] = ()
 
 
@@ -85,7 +86,7 @@ class Setting:
         left_s = SIDE_M / VELOCITY_MS[0] - self.begin_s
         start_m = (VELOCITY_MS[0] * self.begin_s, SIDE_M + VELOCITY_MS[1] * self.begin_s)
         faulty = self.flip > 0 or self.success < 1  # the centroid, too, then lives on the bitmap
-        values = dict(
+        values: dict[str, Any] = dict(
             periods=floor(left_s / self.period_s + 1e-9),
             period_s=self.period_s,
             nodes=self.nodes,

@@ -24,7 +24,7 @@ TRUTH_COV = np.diag([0.25, 0.02, 0.04, 0.01])  # what such programs believe of x
 def pitfalls(runs: int) -> Sheet:
     """Root mean square errors [m] of honest and of leaking evaluations, at T = 1 s."""
     rng, scenario = np.random.default_rng(SEED), scenario_as_read("grnn", PERIOD_S)
-    nodes, model = fixed_positions(scenario.field), LinearModel(scenario)
+    nodes, model = np.asarray(fixed_positions(scenario.field)), LinearModel(scenario)
     states = track(PERIOD_S)
     truth = states[1:, ::2]
     mirrored = truth * (-1, 1) + (scenario.field.side_m, 0)

@@ -96,7 +96,7 @@ def cramer_rao_bound(anchors: str, points: np.ndarray, noise_db: float = NOISE_D
     Returns: (K,) m.
     """
     scenario = scenario_as_read("snapshot", positions=ANCHORS[anchors])
-    slopes = LinearModel(scenario).slopes(points, fixed_positions(scenario.field))
+    slopes = LinearModel(scenario).slopes(points, np.asarray(fixed_positions(scenario.field)))
     slopes = slopes / noise_db
     information = np.swapaxes(slopes, -1, -2) @ slopes
     return np.sqrt(np.trace(np.linalg.inv(information), axis1=-2, axis2=-1))

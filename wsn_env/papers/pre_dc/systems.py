@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from wsn_env.papers.rollout import Record, Trial, play_all
 from wsn_env.scenario import Scenario
 
 NODES = (81, 121, 169, 225)
-READING = dict(
+READING: dict[str, Any] = dict(
     motion=Straight(from_m=5.0, velocity_ms=0.9),
     measurement=Position(noise_m=1.75),
     filter_q=0.02,
@@ -55,7 +56,7 @@ SYSTEMS = {
 }
 
 
-def scenario_as_read(**changes: object) -> Scenario:
+def scenario_as_read(**changes: Any) -> Scenario:
     """PreDC-v0 in our reading of the paper's experiment, with changes."""
     return Scenario.named("PreDC-v0", **(READING | changes))
 

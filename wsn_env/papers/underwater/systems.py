@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import sqrt
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,7 @@ HYSTERESES_DB = (0.0, 3.0, 6.0, 10.0)
 LOST_M, LOST_PERIODS = 100.0, 10  # a run is lost when its mean error over the last ten periods is larger
 
 
-def scenario_as_read(noise: float, particles: int = 300, **changes: object) -> Scenario:
+def scenario_as_read(noise: float, particles: int = 300, **changes: Any) -> Scenario:
     """Underwater-v0 in our reading of the experiment: the filter knows the track's noise, and resamples always.
 
     Args:
@@ -32,7 +33,7 @@ def scenario_as_read(noise: float, particles: int = 300, **changes: object) -> S
     """
     period_s = Scenario.named("Underwater-v0").period_s
     acceleration = sqrt(noise / period_s)
-    reading = dict(
+    reading: dict[str, Any] = dict(
         periods=NOISES[noise],
         speed_ms=2.0,
         acceleration_ms2=acceleration,
