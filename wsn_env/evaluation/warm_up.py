@@ -25,9 +25,9 @@ class Job(NamedTuple):
 
 
 JOBS = (  # the longest first
-    Job("PreDC-v0", ("ekf",), fast=True),
-    Job("Rssi-v0", ("ekf", "ickf", "nonlinear_ls")),
-    Job("Underwater-v0", ("ekf",)),
+    Job("PreDC-v0", ("ekf", "ukf"), fast=True),
+    Job("Rssi-v0", ("ekf", "ukf", "ickf", "nonlinear_ls")),
+    Job("Underwater-v0", ("ekf", "ukf")),
     Job("Binary-v0", ("boundary",)),
     Job("Ble-v0", ()),
     Job("Anchors-v0", ()),
