@@ -28,7 +28,7 @@ from wsn_env.evaluation.front import (
 from wsn_env.evaluation.intervals import Summary
 from wsn_env.reports.front_plots import draw_fronts
 from wsn_env.reports.pictures import write_picture
-from wsn_env.scenario import presets
+from wsn_env.scenario import named_scenarios
 
 SMALL = dict(particles=50, nodes=40, side_m=50.0, crossing_m=20.0, periods=6)
 SCENARIO = Scenario.named("PreDC-v0", **SMALL)
@@ -147,16 +147,16 @@ def test_csv_holds_the_points_and_json_the_hypervolumes(evaluation, tmp_path):
 def test_the_sweep_suits_the_scenario():
     lams = lam_sweep(Scenario.named("PreDC-v0"))
     assert lams == lam_sweep(Scenario.named("Rssi-v0")) == (0.3, 0.53, 0.95, 1.7, 3.0, 5.3, 9.5, 17.0, 30.0)
-    for name, scenario in presets().items():
+    for name, scenario in named_scenarios().items():
         lams = lam_sweep(scenario)
         assert len(lams) == 9 and lams[0] < scenario.lam < lams[-1], name
     assert lam_sweep(Scenario.named("PreDC-v0", lam=(1, 16)), 5) == (1.0, 2.0, 4.0, 8.0, 16.0)
 
 
-@pytest.mark.parametrize("name", presets())
+@pytest.mark.parametrize("name", named_scenarios())
 def test_sensible_policies_stay_within_the_reference_point(name):
     """The head alone errs most, every node within sensing range costs most."""
-    scenario = presets()[name]
+    scenario = named_scenarios()[name]
     played = evaluate(["nearest0", "static_cluster"], scenario, episodes=10, threads=1)
     error, energy = reference_point(scenario)
     assert played.values("nearest0", scenario.lam, "error_m").mean() < error

@@ -14,7 +14,7 @@ from wsn_env.compiled import draws
 from wsn_env.envs.merit import gain
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.models.state import KEEP_CLUSTER
-from wsn_env.scenario import presets
+from wsn_env.scenario import named_scenarios
 from wsn_env.scenario.constants import constants
 
 RSSI = Scenario.named("Rssi-v0", particles=200)
@@ -131,7 +131,7 @@ def test_the_dead_are_passed_over():
         assert all(view.alive[row, node] for node in nodes_of(view, cluster, row) - {view.head[row]})
 
 
-@pytest.mark.parametrize("name", [name for name in presets() if name != "Ble-v0"])
+@pytest.mark.parametrize("name", [name for name in named_scenarios() if name != "Ble-v0"])
 def test_every_scenario_can_be_planned(name):
     scenario = Scenario.named(name, particles=50, periods=8)
     world, planner = World(scenario, threads=1), Planner(scenario, horizon=2, worlds=4)

@@ -184,13 +184,13 @@ class Scenario(Section):
         """A preset, with overrides by quantity.
 
         Args:
-            name: one of `presets()`, with or without "wsn_env/".
+            name: one of `named_scenarios()`, with or without "wsn_env/".
             overrides: as for `override`.
         """
         short = name.removeprefix("wsn_env/")
-        if short not in presets():
-            raise ScenarioError(f"scenario {name!r} is unknown: {suggest(short, presets())}")
-        return presets()[short].override(**overrides)
+        if short not in named_scenarios():
+            raise ScenarioError(f"scenario {name!r} is unknown: {suggest(short, named_scenarios())}")
+        return named_scenarios()[short].override(**overrides)
 
     def override(self, **quantities: Unpack[Quantities]) -> Scenario:
         """A copy with some quantities changed, whatever section they stand in.
@@ -272,7 +272,7 @@ def _words(name: str, part: type) -> str:
 
 
 @cache
-def presets() -> dict[str, Scenario]:
+def named_scenarios() -> dict[str, Scenario]:
     """The named scenarios by id: the files of `scenario.presets`, found by themselves."""
     package = "wsn_env.scenario.presets"
     names = sorted(module.name for module in iter_modules(import_module(package).__path__))
