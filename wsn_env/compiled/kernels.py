@@ -41,7 +41,7 @@ FAST_MODULES = (  # the filter; the world stays strict
 def _options(**wanted: Any) -> dict[str, Any]:
     """Options of njit; without those that this Numba does not know."""
     # fastmath=False is said aloud: a piece that says nothing takes over what its first caller has.
-    wanted["no_cfunc_wrapper"] = True  # for C's callbacks; a tenth of the time of compiling
+    wanted["no_cfunc_wrapper"] = True  # for C's callbacks, of which there are none: 6 % of the time of compiling
     known = {name: value for name, value in wanted.items() if hasattr(DefaultOptions, name)}
     return {"nopython": True, "error_model": "numpy", "nogil": True, "fastmath": False} | known
 
