@@ -10,15 +10,14 @@ import numpy as np
 
 from wsn_env.agents.base import ViewPolicy
 from wsn_env.agents.tuned import nearest_lam, tuned
-from wsn_env.compiled.kernels import kernel, piece
-from wsn_env.envs.merit import chance_of, gain, price_mj
-from wsn_env.models.field import squared_distance
-from wsn_env.models.measurement.base import informs
+from wsn_env.compiled.kernels import kernel, lean_piece
+from wsn_env.envs.expectations import REPORTS, Expectations, outlook_of
+from wsn_env.envs.merit import gain, informing, position_cov, price_mj, sd_drop, squared_between
+from wsn_env.envs.prospects import stands
 from wsn_env.models.quantity import check_quantity
 from wsn_env.models.radio.base import reception, relayed, transmission
-from wsn_env.models.state import Cluster, knowledge_at, sensors_of
-from wsn_env.scenario.constants import constants
-from wsn_env.simulation.messages import in_one_hop
+from wsn_env.models.state import Cluster, knowledge_at
+from wsn_env.scenario.constants import common_constants
 from wsn_env.simulation.view import View
 
 CANDIDATES = 12
@@ -62,95 +61,109 @@ class Greedy(ViewPolicy):
         """Bargain, for every row."""
         table = np.array(self.terms)
         terms = table[nearest_lam(table[:, 0], view.lam)]
-        nodes = view.nearest(CANDIDATES, self.scenario.ring_m)[0]
-        heads, members = view.nearest_living().copy(), np.empty((len(nodes), CANDIDATES), np.int32)
-        numbers = view.lam / terms[:, 1], 1.0 / terms[:, 2]
-        known = constants(self.scenario), view.knowledge.handle
-        _bargain(0, len(nodes), *known, *numbers, nodes, heads, members)
+        nodes = np.column_stack([view.nearest(CANDIDATES, self.scenario.ring_m)[0], view.nearest_living()])
+        heads, members = np.empty(len(nodes), np.int64), np.empty((len(nodes), CANDIDATES), np.int32)
+        prices = view.lam / terms[:, 1], 1.0 / terms[:, 2]
+        table = Expectations(self.scenario, CANDIDATES + 1).of_nodes(view, nodes, REPORTS).table
+        known = common_constants(self.scenario), view.knowledge.handle
+        _bargain(0, len(nodes), *known, table, prices, (heads, members))
         return Cluster(heads, members)
 
 
 @kernel
-def _bargain(start, stop, cs, handle, lams, parts, nodes, heads, members):
-    """Fill members (B, K), and put the standing head into heads (B,), which hold its rival, where it does no worse.
+def _bargain(start, stop, cs, handle, table, prices, cluster):
+    """Fill in the better of two clusters: about the nearest living node, or about the standing head, where that does no
+    worse.
 
     Args:
+        cs: the scenario's common constants.
         handle: of what the network knows (Knowledge).
-        lams: (B,) price of energy over worth of information [m/mJ].
-        parts: (B,) share of what invitations and handovers cost that the period bears.
-        nodes: (B, K) candidates, -1: none.
+        table: of Expected to the depth REPORTS, of CANDIDATES candidates and the nearest living node.
+        prices: (B,) of energy over worth of information [m/mJ], and (B,) share of what invitations and handovers cost
+            that the period bears.
+        cluster: heads (B,) and members (B, K), filled.
     """
-    stay = np.empty(nodes.shape[1], np.int32)
-    known, c = knowledge_at(handle), cs[0]
+    _bargain_rows(
+        start, stop, cs[0].radio, knowledge_at(handle), table, prices, np.empty(CANDIDATES, np.int32), cluster
+    )
+
+
+@lean_piece
+def _bargain_rows(start, stop, r, known, table, prices, chosen, cluster):
+    heads, members = cluster
     for b in range(start, stop):
-        network, belief = known.network, known.belief[b]
-        sensors, old = sensors_of(known, b), network.row[b].head
-        awake, lam, part = network.members[b, : network.row[b].n_members], lams[b], parts[b]
-        moved = _gather(heads[b], members[b], sensors, belief, old, awake, lam, part, nodes[b], c)
+        outlook = outlook_of(known, b, CANDIDATES + 1, table)
+        price, nearest, standing = Price(prices[0][b], prices[1][b]), CANDIDATES, CANDIDATES + 1
+        old = outlook.nodes[standing].node
+        heads[b] = outlook.nodes[nearest].node
+        moved = _gather(nearest, outlook, price, r, members[b])
         if old >= 0 and old != heads[b]:
-            if _gather(old, stay, sensors, belief, old, awake, lam, part, nodes[b], c) >= moved:
-                heads[b], members[b] = old, stay
+            if _gather(standing, outlook, price, r, chosen) >= moved:
+                heads[b] = old
+                for k in range(CANDIDATES):
+                    members[b, k] = chosen[k]
 
 
-@piece
-def _gather(head, chosen, sensors, belief, old, awake, lam, part, nodes, c):
-    """The cluster about a head in `chosen`, -1 at the end; returns what it is worth, less its price [m]."""
-    mean, cov = belief.predicted_mean, belief.predicted_cov
-    p00, p01, p11 = cov[0, 0], cov[0, 2], cov[2, 2]
+class Price(NamedTuple):
+    """What a row's energy is worth."""
+
+    lam: float  # over worth of information [m/mJ]
+    part: float  # of what invitations and handovers cost
+
+
+@lean_piece
+def _gather(leader, outlook, price, r, chosen):
+    """The cluster about a leader in `chosen` (K,), -1 at the end; returns what it is worth, less its price [m]."""
+    nodes, p = outlook.nodes, position_cov(outlook.cov)
+    head = nodes[leader]
     chosen[:] = -1
-    if head < 0:
+    if head.node < 0:
         return 0.0
-    detection = chance_of(sensors, head, mean, cov, c)
-    drop, q00, q01, q11 = gain(detection, sensors, head, mean, cov, p00, p01, p11, c)
-    total = np.sqrt(p00 + p11) - np.sqrt(max(p00 + p11 - drop, 0.0)) - lam * part * _handover_mj(old, head, sensors, c)
-    p00, p01, p11 = q00, q01, q11
-    size = len(nodes)
-    detections, prices = np.empty(size), np.empty(size)
-    for k in range(size):
-        prices[k] = np.inf  # no candidate
+    trace, after = gain(head, 1.0, p)
+    total = sd_drop(p, trace) - price.lam * price.part * _handover_mj(outlook, head, r)
+    p = after
+    for k in range(CANDIDATES):
         node = nodes[k]
-        if node < 0 or node == head or not in_one_hop(node, head, sensors.positions, c.radio):
-            continue
-        detections[k] = chance_of(sensors, node, mean, cov, c)
-        if informs(c.measurement, detections[k]) > LEAST_DETECTION:
-            called = _invitation_mj(node, head, old, awake, sensors, c)
-            prices[k] = lam * (price_mj(detections[k], sensors, node, head, mean, c) + part * called)
-    for slot in range(size):
-        best, most, after = -1, 0.0, (p00, p01, p11)
-        for k in range(size):
-            if prices[k] < np.inf:
-                drop, q00, q01, q11 = gain(detections[k], sensors, nodes[k], mean, cov, p00, p01, p11, c)
-                value = np.sqrt(p00 + p11) - np.sqrt(max(p00 + p11 - drop, 0.0)) - prices[k]
+        node.open = node.node >= 0 and node.node != head.node and squared_between(node, head) <= r.hop_m * r.hop_m
+        if node.open:
+            node.open = informing(node, 1.0) > LEAST_DETECTION
+        if node.open:
+            called = _invitation_mj(outlook, node, head, r)
+            node.price_m = price.lam * (price_mj(node, outlook, leader, r) + price.part * called)
+    for slot in range(CANDIDATES):
+        best, most, rest = -1, 0.0, p
+        for k in range(CANDIDATES):
+            if nodes[k].open:
+                trace, after = gain(nodes[k], 1.0, p)
+                value = sd_drop(p, trace) - nodes[k].price_m
                 if value > most:
-                    best, most, after = k, value, (q00, q01, q11)
+                    best, most, rest = k, value, after
         if best < 0:
             break
-        prices[best] = np.inf
-        chosen[slot] = nodes[best]
+        nodes[best].open = 0
+        chosen[slot] = nodes[best].node
         total += most
-        p00, p01, p11 = after
+        p = rest
     return total
 
 
-@piece
-def _handover_mj(old, head, sensors, c):
+@lean_piece
+def _handover_mj(outlook, head, r):
     """From the standing head, if there is one; a sink or the target needs none."""
-    if not c.radio.to_head or old < 0 or old == head:
+    old = outlook.nodes[outlook.candidates]
+    if not r.to_head or old.node < 0 or old.node == head.node:
         return 0.0
-    squared = squared_distance(sensors.positions, old, sensors.positions[head, 0], sensors.positions[head, 1])
-    return 1e3 * (relayed(c.radio, c.radio.handover_bits, squared) + reception(c.radio, c.radio.handover_bits))
+    squared = squared_between(old, head)
+    return 1e3 * (relayed(r, r.handover_bits, squared) + reception(r, r.handover_bits))
 
 
-@piece
-def _invitation_mj(node, head, old, awake, sensors, c):
+@lean_piece
+def _invitation_mj(outlook, node, head, r):
     """To a node that is not awake yet; a new head invites all."""
-    called = node != old
-    for member in awake:
-        called &= member != node
-    hearing = reception(c.radio, c.radio.invitation_bits)
-    if not c.radio.to_head:
+    called = not stands(outlook, node.node)
+    hearing = reception(r, r.invitation_bits)
+    if not r.to_head:
         return 1e3 * hearing * called
-    if not called and head == old:
+    if not called and head.node == outlook.nodes[outlook.candidates].node:
         return 0.0
-    squared = squared_distance(sensors.positions, node, sensors.positions[head, 0], sensors.positions[head, 1])
-    return 1e3 * (transmission(c.radio, c.radio.invitation_bits, squared) + hearing)
+    return 1e3 * (transmission(r, r.invitation_bits, squared_between(node, head)) + hearing)

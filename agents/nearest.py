@@ -11,11 +11,12 @@ import numpy as np
 
 from wsn_env.agents.base import ViewPolicy
 from wsn_env.agents.tuned import tuned
-from wsn_env.envs.merit import order_by_merit
+from wsn_env.envs.expectations import REPORTS, Expectations
+from wsn_env.envs.merit import order_by_information
 from wsn_env.models.quantity import check_quantity, suggest
 from wsn_env.models.state import Cluster
 from wsn_env.scenario import Scenario
-from wsn_env.scenario.constants import constants
+from wsn_env.scenario.constants import common_constants
 from wsn_env.simulation.geometry import distances_to
 from wsn_env.simulation.view import View
 
@@ -66,9 +67,10 @@ def surround(view: View, scenario: Scenario, order: str, hysteresis_m: Any, size
     if order == "nearest":
         nodes = view.nearest(most + 1)[0]
     else:
-        candidates = view.nearest(max(CANDIDATES, most + 1), scenario.ring_m)[0]
-        nodes, free = np.empty((len(kept), most + 1), np.int64), np.zeros(len(kept))
-        order_by_merit(0, len(kept), constants(scenario), view.knowledge.handle, kept, free, candidates, nodes)
+        nodes = np.empty((len(kept), most + 1), np.int64)
+        expected = Expectations(scenario, max(CANDIDATES, most + 1)).of(view, REPORTS)
+        found = expected.nodes, expected.table
+        order_by_information(0, len(kept), common_constants(scenario), view.knowledge.handle, kept >= 0, found, nodes)
     head = np.where(kept >= 0, kept, nodes[:, 0])
     others = (nodes >= 0) & (nodes != head[:, None])
     members = np.where(others & (np.cumsum(others, axis=1) <= np.reshape(sizes, (-1, 1))), nodes, -1)

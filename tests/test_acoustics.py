@@ -7,9 +7,8 @@ import pytest
 
 from tests.test_particle import NODES, Filter, moments
 from tests.test_sensing import assert_normal, measured
-from tests.worlds import sensors_of
+from tests.worlds import expected, expected_gain
 from wsn_env import Scenario
-from wsn_env.envs.merit import gain
 from wsn_env.filters.linear import LinearModel
 from wsn_env.models.acoustics import absorption_db_per_km, ambient_noise_db
 from wsn_env.models.measurement.sonar import Sonar
@@ -95,7 +94,8 @@ def test_information_gain_knows_the_slope():
     """Of a sure detection at a sharp belief: the Kalman update with the level's slope along the line of sight."""
     scenario = Scenario.named("PreDC-v0", measurement="sonar", frequency_khz=500.0)
     positions, mean, cov = np.array([[40.0, 50.0]]), np.array([60.0, 0, 50.0, 0]), 1e-9 * np.eye(4)
-    drop, *after = gain(1.0, sensors_of(positions), 0, mean, cov, 4.0, 0.0, 4.0, constants(scenario)[0])
+    (node,) = expected(scenario, positions, mean, cov)
+    drop, *after = expected_gain(node, 1.0, 4.0 * np.eye(4))
     slope = 15 / math.log(10) / 20 + absorption_db_per_km(500.0) / 1000
     left = 4 - 16 * slope**2 / (4 * slope**2 + 9)
     np.testing.assert_allclose([drop, *after], [4 - left, left, 0, 4], rtol=1e-6, atol=1e-9)

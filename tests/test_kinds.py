@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from numba import njit
 
+from tests.worlds import expected, expected_gain
 from wsn_env import Scenario, World, make_policy
 from wsn_env.compiled import draws
 from wsn_env.compiled.arrays import record
-from wsn_env.envs.merit import gain
 from wsn_env.filters.linear import LinearModel
 from wsn_env.models import Line, Measurement, ScenarioError
 from wsn_env.models.detection.base import detects, mean_probability, probability, stream_of
@@ -20,7 +20,6 @@ from wsn_env.models.kinds import constants_type, fill_constants
 from wsn_env.models.library import DETECTIONS, MEASUREMENTS, MOTIONS, RADIOS
 from wsn_env.models.measurement.base import node_at, sample, weigh
 from wsn_env.models.radio.base import reception, relayed, transmission
-from wsn_env.models.state import Sensors
 from wsn_env.scenario.constants import constants
 from wsn_env.simulation.episode import Tracks
 
@@ -50,11 +49,6 @@ def _log_likelihoods(cs, places, values, x, y, out):
         weight = np.zeros(1, np.float32)
         weigh(cs[0].measurement, px, py, weight, node, values[i])
         out[i] = weight[0]
-
-
-@njit
-def _gain(cs, positions, receivers, mean, cov):
-    return gain(0.6, Sensors(positions, receivers), 0, mean, cov, cov[0, 0], cov[0, 2], cov[2, 2], cs[0])
 
 
 def drawn(name: str) -> tuple[Scenario, np.ndarray]:
@@ -113,8 +107,8 @@ def test_every_measurement_informs_and_moves_the_filter(name):
         least = min(least, outcome.n_eff[0])
         mean, cov = state.belief.predicted_mean[0], state.belief.predicted_cov[0]
         place = np.array([[mean[0] + scenario.ring_m + 3.0, mean[2] + 2.0]])
-        receivers = state.belief.receivers[0, :1]
-        drop, *after = _gain(constants(scenario), place, receivers, mean, cov)
+        receivers = state.belief.receivers[0, :1] if scenario.measurement.lasting_errors else None
+        drop, *after = expected_gain(expected(scenario, place, mean, cov, receivers)[0], 0.6, cov)
         most = max(most, drop)
         assert after[0] > 0 and after[2] > 0 and after[0] + after[2] <= cov[0, 0] + cov[2, 2] + 1e-9
     assert least < 0.9 * scenario.tracking.particles and most > 1e-4

@@ -4,20 +4,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tests.worlds import sensors_of
+from tests.worlds import expected, expected_gain
 from wsn_env import Scenario, View, World
-from wsn_env.compiled.kernels import kernel
 from wsn_env.envs.actions import MenuAction
-from wsn_env.envs.merit import gain
 from wsn_env.models.state import KEEP_CLUSTER
-from wsn_env.scenario.constants import constants
 
 MOVE_WITH_ALL = 18  # the best node leads, the next eight follow
-
-
-@kernel
-def gain_of(cs, sensors, node, mean, cov):
-    return gain(1.0, sensors, node, mean, cov, cov[0, 0], cov[0, 2], cov[2, 2], cs[0])
 
 
 def view_of(scenario, mean, cov):
@@ -41,7 +33,7 @@ def test_information_is_greedy_in_the_trace_of_the_posterior():
     mean, cov = np.array([60.0, 0, 130, 0]), np.diag([90.0, 1, 40, 1])
     cov[0, 2] = cov[2, 0] = 25.0
     positions = np.array(scenario.field.positions)
-    p, left, expected = cov[::2, ::2].copy(), list(range(8)), []
+    p, left, best_first = cov[::2, ::2].copy(), list(range(8)), []
     while left:
         after = {}
         for node in left:
@@ -50,9 +42,9 @@ def test_information_is_greedy_in_the_trace_of_the_posterior():
             after[node] = p - np.outer(p @ h, h @ p) / (h @ p @ h + m.noise_db**2)
         best = min(left, key=lambda node: np.trace(after[node]))
         p = after[best]
-        expected.append(best)
+        best_first.append(best)
         left.remove(best)
-    assert order(scenario, "information", mean, cov) == expected
+    assert order(scenario, "information", mean, cov) == best_first
 
 
 def test_value_takes_the_cheaper_of_two_that_tell_the_same():
@@ -84,6 +76,7 @@ def test_a_bit_is_worth_the_variance_that_it_takes_away(offset):
         mass = density[side].sum()
         middle = (x[side] * density[side]).sum() / mass
         kept += ((x[side] - middle) ** 2 * density[side]).sum()
-    drop, p00, p01, p11 = gain_of(constants(scenario), sensors_of(np.array(scenario.field.positions)), 0, mean, cov)
+    (node,) = expected(scenario, scenario.field.positions, mean, cov)
+    drop, p00, p01, p11 = expected_gain(node, 1.0, cov)
     assert drop == pytest.approx(sd**2 - kept * (x[1] - x[0]), rel=2e-3)
     assert p00 == pytest.approx(sd**2 - drop) and p11 == pytest.approx(4.0) and abs(p01) < 1e-9

@@ -8,16 +8,14 @@ import pytest
 
 from studies import tuning
 from tests.test_policies import SCENARIO, chosen, walked
-from tests.worlds import sensors_of
+from tests.worlds import expected
 from wsn_env import Scenario, View, World
 from wsn_env.agents.adaptive import RULES, Adaptive, Switch
 from wsn_env.agents.greedy import Greedy, Terms
 from wsn_env.agents.nearest import ORDERS, Nearest
 from wsn_env.agents.tuned import TABLE, nearest_lam
 from wsn_env.envs.actions import MenuAction
-from wsn_env.envs.merit import chance_of
 from wsn_env.models.quantity import ScenarioError
-from wsn_env.scenario.constants import constants
 
 RSSI = Scenario.named("Rssi-v0", particles=200)
 EVER = 1e9  # a hysteresis that no head leaves
@@ -131,8 +129,8 @@ def covariance_after(p, detection):
 
 def chances(scenario, view, row, nodes):
     """Of detecting the target, under the belief."""
-    sensors, mean, cov = sensors_of(view.positions[row]), view.predicted_mean[row], view.predicted_cov[row]
-    return np.array([chance_of(sensors, node, mean, cov, constants(scenario)[0]) for node in nodes])
+    about = view.predicted_mean[row], view.predicted_cov[row]
+    return expected(scenario, view.positions[row, list(nodes)], *about)["detection"]
 
 
 def price_mj(view, row, node, head, detection, service):

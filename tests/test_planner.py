@@ -5,17 +5,15 @@ import pytest
 
 from studies.planning import main
 from tests.test_policies import SCENARIO, chosen, walked
-from tests.worlds import assert_same, sensors_of
+from tests.worlds import assert_same, expected, expected_gain
 from wsn_env import Scenario, View, World, evaluate
 from wsn_env.agents.imagined import GaussianTracker, draw_worlds, imagined_world, place_nodes, rows_of
 from wsn_env.agents.nearest import ORDERS, Nearest
 from wsn_env.agents.planner import Planner
 from wsn_env.compiled import draws
-from wsn_env.envs.merit import gain
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.models.state import KEEP_CLUSTER
 from wsn_env.scenario import named_scenarios
-from wsn_env.scenario.constants import constants
 
 RSSI = Scenario.named("Rssi-v0", particles=200)
 QUICK = dict(horizon=3, worlds=12)
@@ -233,13 +231,6 @@ def test_a_strength_tells_the_gaussian_tracker_what_its_information_says():
     for row in range(4):
         own = state.belief.row[row]
         m, p = own["predicted_mean"], own["predicted_cov"]
-        told = gain(
-            1.0,
-            sensors_of(state.network.positions[row]),
-            nodes[row, 2],
-            m,
-            p,
-            *p[[0, 0, 2], [0, 2, 2]],
-            constants(RSSI)[0],
-        )
-        np.testing.assert_allclose([own["cov"][0, 0], own["cov"][0, 2], own["cov"][2, 2]], told[1:], rtol=1e-9)
+        (node,) = expected(RSSI, state.network.positions[row, nodes[row, 2:]], m, p)
+        _, *after = expected_gain(node, 1.0, p)
+        np.testing.assert_allclose([own["cov"][0, 0], own["cov"][0, 2], own["cov"][2, 2]], after, rtol=1e-9)

@@ -5,11 +5,12 @@ from math import isqrt
 import numpy as np
 from hypothesis import strategies as st
 
-from wsn_env import Cluster, Scenario, World
+from wsn_env import Cluster, Scenario, View, World
 from wsn_env.compiled.arrays import Arrays
+from wsn_env.envs.expectations import REPORTS, Expectations
+from wsn_env.envs.merit import PositionCov, gain
 from wsn_env.models.library import MEASUREMENTS
-from wsn_env.models.measurement.beacon_levels import RECEIVER
-from wsn_env.models.state import Sensors
+from wsn_env.models.state import Grid, Knowledge
 from wsn_env.scenario.tracking import BOUNDARY_TRACKERS, reads
 
 TRACKERS = ("particle", "particle", "particle", "ekf", "ukf", "ickf", "snapshot", *BOUNDARY_TRACKERS)
@@ -138,9 +139,33 @@ def choices(seed, period, rows, nodes):
     return Cluster(rng.integers(low, high, rows), rng.integers(low, high, (rows, width)))
 
 
-def sensors_of(positions):
-    """Nodes (S, 2) that hear no beacon, as orders of merit take them."""
-    return Sensors(positions, np.zeros(0, RECEIVER))
+def expected(scenario, positions, mean, cov, receivers=None):
+    """(S,) EXPECTED of nodes at positions (S, 2), under a belief about the period to come.
+
+    Args:
+        receivers: (S,) RECEIVER, what has been learnt of them, where errors last.
+    """
+    nodes, side = len(positions), Grid.side(len(positions))
+    axes = {"rows": 1, "nodes": nodes, "cells": side * side + 1} | scenario.measurement.axes(nodes)
+    known = Knowledge.zeros(**axes)
+    known.network.row["head"] = -1
+    known.network.positions[0] = positions
+    known.belief["predicted_mean"], known.belief["predicted_cov"] = mean, cov
+    if receivers is not None:
+        known.receivers[0] = receivers
+    return Expectations(scenario, nodes).of_nodes(View(known), np.arange(nodes)[None], REPORTS).table[0, :nodes]
+
+
+def expected_gain(node, detection, cov):
+    """Drop of the position covariance's trace by a report that comes so likely, and its entries xx, xy, yy after it.
+
+    Args:
+        node: EXPECTED.
+    """
+    sure = node.copy()
+    sure["detection"] = detection
+    drop, after = gain(sure, 1.0, PositionCov(cov[0, 0], cov[0, 2], cov[2, 2]))
+    return drop, *after
 
 
 def keys_of(seed, rows):

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
-from functools import cached_property
+from functools import cache, cached_property
+from operator import attrgetter
 from typing import Any, Self
 
 import numpy as np
@@ -75,7 +76,7 @@ class Arrays:
 
     def parts(self) -> tuple[Any, ...]:
         """The fields, in order."""
-        return tuple(getattr(self, item.name) for item in fields(self))
+        return tuple(vars(self)[name] for name in _names(type(self)))
 
     def map(self, change: Callable[[np.ndarray], np.ndarray]) -> Self:
         """The same record with every array changed."""
@@ -87,13 +88,7 @@ class Arrays:
 
     def leaves(self) -> list[tuple[str, np.ndarray]]:
         """(name, array) of all, such as ("network.battery", ...)."""
-        found: list[tuple[str, np.ndarray]] = []
-        for item, each in zip(fields(self), self.parts()):
-            if isinstance(each, Arrays):
-                found += [(f"{item.name}.{name}", leaf) for name, leaf in each.leaves()]
-            else:
-                found.append((item.name, each))
-        return found
+        return [(name, read(self)) for name, _, _, read in _leaves(type(self))]
 
     @cached_property
     def handle(self) -> Any:
@@ -101,13 +96,14 @@ class Arrays:
         if config.DISABLE_JIT:
             return self
         words: list[int] = []
-        for (name, leaf), (dtype, dimensions) in zip(self.leaves(), _leaf_types(type(self))):
+        for name, dtype, dimensions, read in _leaves(type(self)):
+            leaf = read(self)
             if leaf.dtype != dtype or leaf.ndim != dimensions or not leaf.flags.c_contiguous:
                 raise TypeError(
                     f"{type(self).__name__}.{name}: {leaf.dtype} of {leaf.ndim} dimensions, contiguous:"
                     f" {leaf.flags.c_contiguous}; must be contiguous {dtype} of {dimensions}"
                 )
-            words += leaf.__array_interface__["data"][0], *leaf.shape
+            words += leaf.ctypes.data, *leaf.shape
         return np.array(words, np.int64)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -122,11 +118,23 @@ class Arrays:
         raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}")
 
 
-def _leaf_types(cls: type[Arrays]) -> list[tuple[np.dtype, int]]:
-    found: list[tuple[np.dtype, int]] = []
+@cache
+def _names(cls: Any) -> tuple[str, ...]:
+    return tuple(item.name for item in fields(cls))
+
+
+@cache
+def _leaves(cls: Any) -> list[tuple[str, np.dtype, int, Callable[[Any], np.ndarray]]]:
+    """Name, type of the elements and dimensions of every array, and what reads it."""
+    found: list[Any] = []
     for item in fields(cls):
         about = item.metadata
-        found += _leaf_types(about["part"]) if "part" in about else [(about["dtype"], len(about["axes"]))]
+        if "part" in about:
+            for name, dtype, dimensions, _ in _leaves(about["part"]):
+                path = f"{item.name}.{name}"
+                found.append((path, dtype, dimensions, attrgetter(path)))
+        else:
+            found.append((item.name, about["dtype"], len(about["axes"]), attrgetter(item.name)))
     return found
 
 
@@ -141,7 +149,7 @@ def _layout(cls: type[Arrays]) -> list:
 
 def _words(cls: type[Arrays]) -> int:
     """How long a handle is."""
-    return sum(1 + dimensions for _, dimensions in _leaf_types(cls))
+    return sum(1 + dimensions for _, _, dimensions, _ in _leaves(cls))
 
 
 class _ByAddress(types.Type):

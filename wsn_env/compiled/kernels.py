@@ -5,8 +5,9 @@ GIL is released, so that `over_rows` can share a batch among threads; rows never
 change a bit. With NUMBA_DISABLE_JIT=1 everything runs as plain Python.
 
 `lean_kernel` and `lean_piece` do without Numba's reference counts, an atomic operation for every row of an array taken,
-which cost more than a period's physics. They must allocate nothing: Numba raises "NRT required" where one does. Where
-Numba does not know that option, it counts.
+which cost more than a period's physics. They must allocate nothing: Numba raises "NRT required" where one does. Nor may
+a lean piece return an array to one that counts, which would give it up once too often: what needs room for its rows is
+a `kernel` that makes it and hands it on to a lean piece. Where Numba does not know that option, it counts.
 """
 
 from __future__ import annotations
@@ -75,8 +76,9 @@ class Kernel:
     of kinds, and each has a place of its own on disk: two processes never write to one place about different kinds.
     """
 
-    def __init__(self, function: FunctionType, options: dict[str, Any]) -> None:
+    def __init__(self, function: FunctionType, options: dict[str, Any], twin_of: Kernel | None = None) -> None:
         functools.update_wrapper(self, function)
+        self.twin_of = twin_of  # of a `fast` one
         self.py_func: FunctionType = function
         self.targetoptions: dict[str, Any] = options
         names = function.__code__.co_varnames[: function.__code__.co_argcount]
@@ -90,6 +92,12 @@ class Kernel:
     def _by_kind(self, *arguments: Any) -> Any:
         made = self._made.get(id(arguments[self._place].dtype))
         return made[0](*arguments) if made else self._first(*arguments)
+
+    def made_for(self, arguments: tuple[Any, ...]) -> Callable[..., Any]:
+        """What is called for such arguments, which have been met before."""
+        if self._place < 0 or numba.config.DISABLE_JIT:
+            return self.call
+        return self._made[id(arguments[self._place].dtype)][0]
 
     def _first(self, *arguments: Any) -> Any:
         if numba.config.DISABLE_JIT:
@@ -107,8 +115,29 @@ class Kernel:
         self._made[id(kinds)] = made, kinds
         return result
 
-    def __reduce__(self) -> str:
+    def __reduce__(self) -> Any:
+        if self.twin_of is not None:
+            return fast, (self.twin_of,)
         return vars(self)["__qualname__"]  # of its module: pickled by name, as functions are
+
+
+class Pinned:
+    """A kernel for an owner whose constants are always of one type: that is looked up once, not at every call."""
+
+    def __init__(self, kernel: Kernel) -> None:
+        self._kernel = kernel
+        self.call: Callable[..., Any] = self._first
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.call(*arguments)
+
+    def _first(self, *arguments: Any) -> Any:
+        result = self._kernel.call(*arguments)
+        self.call = self._kernel.made_for(arguments)
+        return result
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Pinned, (self._kernel,)
 
 
 def kernel(function: Any) -> Kernel:
@@ -138,7 +167,7 @@ def fast(compiled: Any) -> Any:
     twin = FunctionType(function.__code__, function.__globals__ | twins, function.__name__, function.__defaults__)
     twin.__qualname__, twin.__module__ = f"{function.__qualname__}_fast", function.__module__
     options = compiled.targetoptions | {"fastmath": FAST}
-    return Kernel(twin, options) if isinstance(compiled, Kernel) else numba.jit(**options)(twin)
+    return Kernel(twin, options, compiled) if isinstance(compiled, Kernel) else numba.jit(**options)(twin)
 
 
 def _has_twin(value: Any) -> bool:
@@ -173,7 +202,13 @@ def over_rows(kernel: Any, rows: int, threads: int, *arguments: Any) -> int:
 
 def threads_for(marked: np.ndarray, threads: int) -> int:
     """How many threads serve a kernel that works in the marked rows (B,) only: waking them for a few takes longer."""
-    return threads if np.count_nonzero(marked) > SERIAL_ROWS else 1
+    return threads if threads > 1 and np.count_nonzero(marked) > SERIAL_ROWS else 1
+
+
+@functools.cache
+def every_row(rows: int) -> np.ndarray:
+    """(B,) bool, all marked; not to be written to."""
+    return np.ones(rows, bool)
 
 
 def available_threads() -> int:

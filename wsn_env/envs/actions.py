@@ -8,13 +8,14 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from gymnasium import spaces
 
-from wsn_env.compiled.kernels import lean_kernel
-from wsn_env.envs.merit import KEEP, NEAREST, ORDERS, fill_chances, rank_row
+from wsn_env.compiled.kernels import Pinned, kernel, lean_piece
+from wsn_env.envs.expectations import PLACES, REPORTS, Expectations, outlook_of
+from wsn_env.envs.merit import KEEP, NEAREST, ORDERS, RANKED, rank_row
 from wsn_env.models.measurement.base import Order
 from wsn_env.models.quantity import suggest
-from wsn_env.models.state import KEEP_CLUSTER, Cluster, knowledge_at, sensors_of
+from wsn_env.models.state import KEEP_CLUSTER, Cluster, knowledge_at
 from wsn_env.scenario import Scenario
-from wsn_env.scenario.constants import constants
+from wsn_env.scenario.constants import common_constants
 from wsn_env.simulation.view import View
 
 ActionName = Literal["menu", "subset", "radius", "scores", "nodes", "cluster"]
@@ -48,17 +49,17 @@ class MenuAction:
             raise ValueError(f"candidates = {candidates}: the menu needs at least {MENU_MEMBERS + 1}")
         self.space: spaces.Discrete = spaces.Discrete(MENU_ENTRIES)
         self._by, self._candidates, self._ring_m = ORDERS.index(order), candidates, scenario.ring_m
-        self._constants = constants(scenario)
+        self._expectations, self._constants = Expectations(scenario, candidates), common_constants(scenario)
+        self._read = Pinned(_read_menu)
 
     def cluster(self, action: Any, view: View) -> Cluster:
         """The cluster that the menu's entries name."""
         rows = len(view.row)
         actions = np.ascontiguousarray(_whole_numbers(action, self.space, rows), np.int64)
-        nodes = view.nearest(self._candidates, self._ring_m)[0]
+        table = self._expectations.of(view, PLACES if self._by == NEAREST else REPORTS).table
+        found, handle = (self._candidates, table), view.knowledge.handle
         heads, members = np.empty(rows, np.int64), np.empty((rows, GROUP), np.int32)
-        scratch = np.empty((3, *nodes.shape)), np.empty(nodes.shape, np.int64)
-        handle = view.knowledge.handle
-        if _read_menu.call(0, rows, self._constants, self._by, actions, nodes, handle, *scratch, heads, members):
+        if self._read.call(0, rows, self._constants, handle, (self._by, actions), found, (heads, members)):
             raise _refusal(action, self.space)
         return Cluster(heads, members)
 
@@ -73,35 +74,45 @@ class MenuAction:
         return valid
 
 
-@lean_kernel
-def _read_menu(start, stop, cs, by, actions, nodes, handle, scratch, ordered, heads, members):
-    """Fill heads (B,) and members (B, M) from the menu's entries and the candidates (B, K).
+@kernel
+def _read_menu(start, stop, cs, handle, choices, found, cluster):
+    """Fill in the clusters that the menu's entries name.
 
-    Returns: how many actions are not in the menu.
+    Args:
+        cs: the scenario's common constants.
+        handle: of what the network knows (Knowledge).
+        choices: the place in ORDERS, and entries (B,).
+        found: how many candidates, and the table of Expected.
+        cluster: heads (B,) and members (B, M), filled.
+
+    Returns: how many choices are not in the menu.
     """
-    known, chances, left, drops = knowledge_at(handle), scratch[0], scratch[1], scratch[2]
+    ranking = np.empty(found[0], RANKED)
+    return _read_rows(start, stop, cs[0], knowledge_at(handle), choices, found, ranking, cluster)
+
+
+@lean_piece
+def _read_rows(start, stop, c, known, choices, found, ranking, cluster):
+    (by, entries), (candidates, table), (heads, members) = choices, found, cluster
     strange = 0
     for b in range(start, stop):
-        action, head = actions[b], known.network.row[b].head
-        strange += action < 0 or action >= MENU_ENTRIES
+        entry = entries[b]
+        strange += entry < 0 or entry >= MENU_ENTRIES
         members[b] = -1
-        if action == 0 and head >= 0:
+        if entry == 0 and known.network.row[b].head >= 0:
             heads[b] = KEEP_CLUSTER
             continue
-        rule, further = (action - 1) // GROUP, (action - 1) % GROUP
-        if action <= 0:
+        rule, further = (entry - 1) // GROUP, (entry - 1) % GROUP
+        if entry <= 0:
             rule, further = KEEP, 0
-        mean, cov, lam = known.belief[b].predicted_mean, known.belief[b].predicted_cov, known.row[b].lam
-        sensors = sensors_of(known, b)
-        if by != NEAREST:
-            fill_chances(sensors, nodes[b], mean, cov, cs[0], chances[b])
-        heads[b] = rank_row(
-            by, rule, sensors, head, mean, cov, lam, nodes[b], chances[b], cs[0], left[b], ordered[b], drops[b]
-        )
+        outlook = outlook_of(known, b, candidates, table)
+        leader = rank_row(by, rule, outlook, c, ranking)
+        heads[b] = outlook.nodes[leader].node if leader >= 0 else -1
         slot = 0
-        for node in ordered[b]:
-            if further > 0 and node >= 0 and node != heads[b]:
-                members[b, slot] = node
+        for k in range(len(ranking)):
+            place = ranking[k].place
+            if further > 0 and place >= 0 and outlook.nodes[place].node != heads[b]:
+                members[b, slot] = outlook.nodes[place].node
                 slot += 1
                 further -= 1
     return strange

@@ -1,14 +1,13 @@
 """What learners see of a belief and of a candidate, as numbers of about unit size."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from wsn_env.compiled.elementary import log
 from wsn_env.compiled.kernels import lean_piece
-from wsn_env.envs.merit import chance_of, gain, place_of
-from wsn_env.models.field import squared_distance
-from wsn_env.models.state import Sensors, sensors_of
+from wsn_env.envs.expectations import Outlook
+from wsn_env.envs.merit import gain, position_cov, squared_between
 
 BELIEF_FEATURES = (
     "lam",  # log, halved
@@ -44,38 +43,60 @@ CANDIDATE_FEATURES = (
     "merit",  # 1 for the first in the greedy order of information after the head, 1/2, 1/3, ...; 0 for the head
     "merit_drop",  # drop of the expected sd that it brings there, as a share of the prediction's
 )
+WIDTH = len(CANDIDATE_FEATURES)
 BOUND = 10.0
 NINTH = 9
 
 
+class Heading(NamedTuple):
+    """Direction of the predicted velocity."""
+
+    x: float
+    y: float
+
+
 @lean_piece
-def describe_belief(
-    known: Any, b: int, nodes: np.ndarray, distances: np.ndarray, c: Any, f: np.ndarray
-) -> tuple[float, float]:
-    """Fill f with BELIEF_FEATURES of row b. Returns the direction of the predicted velocity.
+def describe_belief(outlook: Outlook, row: Any, reports: int, radius_m: float, f: np.ndarray) -> Heading:
+    """Fill f with BELIEF_FEATURES of a row.
 
     Args:
-        known: what the network knows (Knowledge).
-        nodes, distances: (K,) the nearest candidates.
+        outlook: to the depth REPORTS.
+        row: STATE.
+        reports: how many came in the last period.
     """
-    network, row = known.network, known.row[b]
-    m, p, standing = known.belief[b].predicted_mean, known.belief[b].predicted_cov, network.row[b]
+    nodes, head = outlook.nodes, outlook.nodes[outlook.candidates]
     f[:] = 0.0
     f[0] = 0.5 * log(max(row.lam, 1e-3))
-    ex, ey = _describe_ellipse(m, p, c.radius_m, f)
+    heading = _describe_ellipse(outlook, radius_m, f)
     f[9] = 0.2 * row.log_miss
-    f[10] = 0.25 * known.reports.count[b]
-    if standing.head >= 0:
-        is_nearest, n = standing.head == nodes[0], standing.n_members
-        sensors = sensors_of(known, b)
-        _describe_head(standing.head, is_nearest, network.members[b], n, sensors, m, p, ex, ey, c, f)
-    f[18] = distances[min(NINTH, len(distances)) - 1] / c.radius_m
-    return ex, ey
+    f[10] = 0.25 * reports
+    if head.node >= 0:
+        _write_place(head, outlook, heading, radius_m, f, 11)
+        dx, dy = (head.x - outlook.mean[0]) / radius_m, (head.y - outlook.mean[2]) / radius_m
+        f[13] = np.sqrt(dx * dx + dy * dy)
+        f[14] = head.detection
+        f[15] = 1.0 if head.node == nodes[0].node else 0.0
+        f[16] = 0.25 * (len(nodes) - outlook.candidates - 1)
+        missed = 1.0 - f[14]
+        for k in range(outlook.candidates + 1, len(nodes)):
+            missed *= 1.0 - nodes[k].detection
+        f[17] = 1.0 - missed
+    f[18] = nodes[min(NINTH, outlook.candidates) - 1].distance_m / radius_m
+    return heading
 
 
 @lean_piece
-def _describe_ellipse(m, p, radius_m, f):
-    """f[1:9]: the position's ellipse and the velocity. Returns the direction of the velocity."""
+def _write_place(node, outlook, heading, radius_m, f, at):
+    """f[at], f[at + 1]: where a node stands from the prediction, in radii along and across the velocity."""
+    dx, dy = (node.x - outlook.mean[0]) / radius_m, (node.y - outlook.mean[2]) / radius_m
+    f[at] = dx * heading.x + dy * heading.y
+    f[at + 1] = dy * heading.x - dx * heading.y
+
+
+@lean_piece
+def _describe_ellipse(outlook, radius_m, f):
+    """f[1:9]: the position's ellipse and the velocity."""
+    m, p = outlook.mean, outlook.cov
     half, off = 0.5 * (p[0, 0] + p[2, 2]), 0.5 * (p[0, 0] - p[2, 2])
     root = np.sqrt(off * off + p[0, 2] * p[0, 2])
     major, minor = max(half + root, 1e-6), max(half - root, 1e-6)
@@ -91,78 +112,46 @@ def _describe_ellipse(m, p, radius_m, f):
     f[6] = sin2 * c2 - cos2 * s2
     f[7] = speed
     f[8] = 0.5 * log(max(p[1, 1] + p[3, 3], 1e-6))
-    return ex, ey
+    return Heading(ex, ey)
 
 
 @lean_piece
-def _describe_head(head, is_nearest, members, n, sensors, m, p, ex, ey, c, f):
-    """f[11:18]: the head, and what the standing cluster would detect at the prediction."""
-    dx, dy = (sensors.positions[head, 0] - m[0]) / c.radius_m, (sensors.positions[head, 1] - m[2]) / c.radius_m
-    f[11] = dx * ex + dy * ey
-    f[12] = dy * ex - dx * ey
-    f[13] = np.sqrt(dx * dx + dy * dy)
-    f[14] = chance_of(sensors, head, m, p, c)
-    f[15] = 1.0 if is_nearest else 0.0
-    f[16] = 0.25 * n
-    missed = 1.0 - f[14]
-    for k in range(n):
-        missed *= 1.0 - chance_of(sensors, members[k], m, p, c)
-    f[17] = 1.0 - missed
+def describe_candidate(outlook: Outlook, place: int, heading: Heading, radius_m: float, g: np.ndarray) -> None:
+    """g[0:7], g[8]: a candidate's place, its chance of detection, role and gain.
 
-
-@lean_piece
-def describe_candidate(
-    node: int,
-    detection: float,
-    head: int,
-    members: np.ndarray,
-    n: int,
-    sensors: Sensors,
-    m: Any,
-    p: Any,
-    ex: float,
-    ey: float,
-    c: Any,
-    g: np.ndarray,
-) -> None:
-    """g[0:2], g[3:7], g[8]: a candidate's place, its chance `detection`, role and gain."""
-    dx, dy = (sensors.positions[node, 0] - m[0]) / c.radius_m, (sensors.positions[node, 1] - m[2]) / c.radius_m
-    g[0] = dx * ex + dy * ey
-    g[1] = dy * ex - dx * ey
-    g[3] = detection
-    if head >= 0:
-        x, y = sensors.positions[head, 0], sensors.positions[head, 1]
-        g[4] = np.sqrt(squared_distance(sensors.positions, node, x, y)) / c.radius_m
-    for k in range(n):
-        if members[k] == node:
+    Args:
+        outlook: to the depth REPORTS.
+        place: of the candidate among its nodes.
+    """
+    nodes, node = outlook.nodes, outlook.nodes[place]
+    head, p = nodes[outlook.candidates], position_cov(outlook.cov)
+    _write_place(node, outlook, heading, radius_m, g, 0)
+    g[2] = node.distance_m / radius_m
+    g[3] = node.detection
+    if head.node >= 0:
+        g[4] = np.sqrt(squared_between(node, head)) / radius_m
+    for k in range(outlook.candidates, len(nodes)):
+        if nodes[k].node == node.node:
             g[5] = 1.0
-    if node == head:
-        g[5] = 1.0
+    if node.node == head.node:
         g[6] = 1.0
-    drop = gain(detection, sensors, node, m, p, p[0, 0], p[0, 2], p[2, 2], c)[0]
-    g[8] = 0.25 * log(max(drop / (p[0, 0] + p[2, 2] + 1e-12), 1e-6))
+    g[8] = 0.25 * log(max(gain(node, 1.0, p)[0] / (p.xx + p.yy + 1e-12), 1e-6))
 
 
 @lean_piece
-def describe_merit(
-    nodes: np.ndarray, ordered: np.ndarray, drops: np.ndarray, spread: Any, width: int, f: np.ndarray
-) -> None:
+def describe_merit(outlook: Outlook, ranking: np.ndarray, f: np.ndarray) -> None:
     """The last two of CANDIDATE_FEATURES, for all candidates.
 
     Args:
-        nodes: (K,) in the order of the rows of f.
-        ordered, drops: of `order_row`.
-        spread: root of the predicted position covariance's trace [m].
-        width: of a candidate's features.
-        f: (K * width,).
+        ranking: (K,) RANKED by `order_row`.
+        f: (K * WIDTH,).
     """
-    for slot in range(len(ordered)):
-        if ordered[slot] < 0:
-            break
-        k = place_of(ordered[slot], nodes)
+    sd = np.sqrt(outlook.cov[0, 0] + outlook.cov[2, 2] + 1e-12)
+    for slot in range(len(ranking)):
+        k = ranking[slot].place
         if k >= 0:
-            f[k * width + width - 2] = 1.0 / (1.0 + slot)
-            f[k * width + width - 1] = drops[slot] / spread
+            f[k * WIDTH + WIDTH - 2] = 1.0 / (1.0 + slot)
+            f[k * WIDTH + WIDTH - 1] = ranking[slot].drop_m / sd
 
 
 @lean_piece

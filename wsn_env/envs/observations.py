@@ -7,8 +7,10 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from gymnasium import spaces
 
-from wsn_env.compiled.kernels import lean_kernel, over_rows, threads_for
+from wsn_env.compiled.kernels import Pinned, every_row, kernel, lean_piece, over_rows, threads_for
+from wsn_env.envs import features, prospects
 from wsn_env.envs.actions import GROUP, MENU_ENTRIES
+from wsn_env.envs.expectations import REPORTS, REPORTS_AHEAD, Expectations, Expected, outlook_of
 from wsn_env.envs.features import (
     BELIEF_FEATURES,
     BOUND,
@@ -18,14 +20,13 @@ from wsn_env.envs.features import (
     describe_candidate,
     describe_merit,
 )
-from wsn_env.envs.merit import ORDERS, fill_chances, order_row, rank_row
-from wsn_env.envs.prospects import ENTRY_FEATURES, describe_entries, describe_standing, foresee
+from wsn_env.envs.merit import ORDERS, RANKED, order_row, rank_row
+from wsn_env.envs.prospects import ENTRY_FEATURES, Units, describe_entries, describe_standing
 from wsn_env.models.measurement.base import Order
 from wsn_env.models.quantity import suggest
-from wsn_env.models.state import knowledge_at, sensors_of
+from wsn_env.models.state import knowledge_at
 from wsn_env.scenario import Scenario
-from wsn_env.scenario.constants import constants
-from wsn_env.simulation.geometry import find_candidates
+from wsn_env.scenario.constants import common_constants
 from wsn_env.simulation.view import View
 
 ObservationName = Literal["candidates", "menu", "dict", "view"]
@@ -47,99 +48,89 @@ class Observation(Protocol):
         ...
 
 
-@lean_kernel
-def _encode_candidates(start, stop, cs, handle, battery_j, rows, whole, real, out):
+@kernel
+def _encode_candidates(start, stop, cs, handle, battery_j, found, out):
     """Fill out (B, n): BELIEF_FEATURES, then CANDIDATE_FEATURES of each candidate. Only in the rows marked.
 
     Args:
+        cs: the scenario's common constants.
         handle: of what the network knows (Knowledge).
-        rows: (B,) bool.
-        whole: (2, B, K) filled with the candidates, and with them in order of merit.
-        real: (5, B, K) filled with the candidates' distances [m]; the rest is scratch.
+        found: rows (B,) bool; how many candidates; the table of Expected to the depth REPORTS.
     """
-    c, known, width = cs[0], knowledge_at(handle), len(CANDIDATE_FEATURES)
-    nodes, ordered = whole[0], whole[1]
-    distances, chances, left, drops = real[0], real[1], real[2], real[3]
+    ranking = np.empty(found[1], RANKED)
+    _encode_candidate_rows(start, stop, cs[0], knowledge_at(handle), battery_j, found, ranking, out)
+
+
+@lean_piece
+def _encode_candidate_rows(start, stop, c, known, battery_j, found, ranking, out):
+    rows, candidates, table = found
     for b in range(start, stop):
-        if not rows[b]:
-            continue
-        network = known.network
-        m, p, standing = known.belief[b].predicted_mean, known.belief[b].predicted_cov, network.row[b]
-        find_candidates(network, b, m[0], m[2], c.ring_m, nodes[b], distances[b])
-        f = out[b]
-        ex, ey = describe_belief(known, b, nodes[b], distances[b], c, f[:G])
-        f[G:] = 0.0
-        sensors, members = sensors_of(known, b), network.members[b]
-        fill_chances(sensors, nodes[b], m, p, c, chances[b])
-        for k in range(nodes.shape[1]):
-            node, g = nodes[b, k], f[G + k * width : G + (k + 1) * width]
-            if node < 0:
-                g[2] = BOUND
-                continue
-            g[2] = distances[b, k] / c.radius_m
-            g[7] = network.battery[b, node] / battery_j
-            describe_candidate(
-                node, chances[b, k], standing.head, members, standing.n_members, sensors, m, p, ex, ey, c, g
-            )
-        order_row(sensors, standing.head, m, p, 0.0, nodes[b], chances[b], c, left[b], ordered[b], drops[b])
-        describe_merit(nodes[b], ordered[b], drops[b], np.sqrt(p[0, 0] + p[2, 2] + 1e-12), width, f[G:])
-        clip(f)
+        if rows[b]:
+            f, outlook = out[b], outlook_of(known, b, candidates, table)
+            heading = describe_belief(outlook, known.row[b], known.reports.count[b], c.radius_m, f[:G])
+            f[G:] = 0.0
+            for k in range(candidates):
+                node, g = outlook.nodes[k].node, f[G + k * features.WIDTH : G + (k + 1) * features.WIDTH]
+                if node < 0:
+                    g[2] = BOUND
+                else:
+                    describe_candidate(outlook, k, heading, c.radius_m, g)
+                    g[7] = known.network.battery[b, node] / battery_j
+            standing = outlook.nodes[candidates].node >= 0
+            order_row(outlook, candidates if standing else -1, 0.0, c, ranking)
+            describe_merit(outlook, ranking, f[G:])
+            clip(f)
 
 
-@lean_kernel
-def _encode_menu(start, stop, cs, handle, terms, rows, whole, real, out):
+@kernel
+def _encode_menu(start, stop, cs, handle, terms, found, out):
     """Fill out (B, n): BELIEF_FEATURES, then ENTRY_FEATURES of each of the menu's entries. Only in the rows marked.
 
     Args:
         terms: the scenario's typical energy [mJ], the place in ORDERS, its typical cost in each row (B,) [m].
+        found: as for `_encode_candidates`, to the depth REPORTS_AHEAD.
         The rest: as `_encode_candidates`.
     """
-    c, known, width = cs[0], knowledge_at(handle), len(ENTRY_FEATURES)
+    ranking = np.empty(found[1], RANKED)
+    _encode_menu_rows(start, stop, cs[0], knowledge_at(handle), terms, found, ranking, out)
+
+
+@lean_piece
+def _encode_menu_rows(start, stop, c, known, terms, found, ranking, out):
     typical_mj, by, costs = terms
-    nodes, ordered = whole[0], whole[1]
-    distances, chances, left, drops, later = real[0], real[1], real[2], real[3], real[4]
+    rows, candidates, table = found
+    group = GROUP * prospects.WIDTH
     for b in range(start, stop):
-        if not rows[b]:
-            continue
-        network = known.network
-        m, p, standing = known.belief[b].predicted_mean, known.belief[b].predicted_cov, network.row[b]
-        sensors = sensors_of(known, b)
-        members, lam = network.members[b], known.row[b].lam
-        find_candidates(network, b, m[0], m[2], c.ring_m, nodes[b], distances[b])
-        f = out[b]
-        way = describe_belief(known, b, nodes[b], distances[b], c, f[:G])
-        candidates, numbers = (nodes[b], chances[b], later[b]), (lam, costs[b], typical_mj)
-        foresee(sensors, candidates, m, p, c)
-        describe_standing(sensors, standing, members, candidates, m, p, way, numbers, c, f[G : G + width])
-        for rule in range(3):
-            leader = rank_row(
-                by, rule, sensors, standing.head, m, p, lam, nodes[b], chances[b], c, left[b], ordered[b], drops[b]
-            )
-            first = G + width + rule * GROUP * width
-            entries = f[first : first + GROUP * width]
-            describe_entries(
-                sensors, standing, members, candidates, ordered[b], leader, m, p, way, numbers, c, width, entries
-            )
-        clip(f)
+        if rows[b]:
+            f, outlook, units = out[b], outlook_of(known, b, candidates, table), Units(costs[b], typical_mj)
+            heading = describe_belief(outlook, known.row[b], known.reports.count[b], c.radius_m, f[:G])
+            first = G + prospects.WIDTH
+            describe_standing(outlook, heading, units, c, f[G:first])
+            for rule in range(3):
+                leader = rank_row(by, rule, outlook, c, ranking)
+                entries = f[first + rule * group : first + (rule + 1) * group]
+                describe_entries(outlook, ranking, leader, heading, units, c, entries)
+            clip(f)
 
 
 class CandidatesObservation:
     """Flat Box float32: BELIEF_FEATURES, then CANDIDATE_FEATURES of the K living nodes nearest to the prediction."""
 
     features: tuple[str, ...] = CANDIDATE_FEATURES
+    depth, kernel = REPORTS, _encode_candidates
 
     def __init__(self, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> None:
         self.shape: tuple[int, int] = (candidates, len(self.features))
         self.space: spaces.Box = spaces.Box(-BOUND, BOUND, (G + candidates * self.shape[1],), np.float32)
-        self._candidates, self._ring_m, self._threads = candidates, scenario.ring_m, threads
-        self._scenario, self._constants = scenario, constants(scenario)
+        self._candidates, self._threads, self._scenario = candidates, threads, scenario
+        self._expectations, self._constants = Expectations(scenario, candidates, threads), common_constants(scenario)
+        self._encode = Pinned(self.kernel)
 
     def encode(self, view: View) -> np.ndarray:
         """(B, n) float32, fresh."""
         rows = len(view.row)
-        return self._fill(
-            view, np.ones(rows, bool), np.empty((rows, *self.space.shape), np.float32), self._scratch(view)
-        )
+        expected = self._expectations.of(view, self.depth)
+        return self._fill(view, every_row(rows), expected, np.empty((rows, *self.space.shape), np.float32))
 
     def renew(self, view: View, rows: np.ndarray, before: View, last: np.ndarray) -> np.ndarray:
         """What `encode` gives, for less where few rows have changed.
@@ -147,40 +138,32 @@ class CandidatesObservation:
         Args:
             rows: (B,) bool, which have changed since `last` was encoded from the view `before`.
         """
-        whole, real = self._scratch(view)
-        whole[0], real[0] = before.nearest(self._candidates, self._ring_m)
-        return self._fill(view, rows, last.copy(), (whole, real))
+        return self._fill(view, rows, self._expectations.renew(view, self.depth, rows, before), last.copy())
 
-    def _scratch(self, view: View) -> tuple[np.ndarray, np.ndarray]:
-        """(2, B, K) and (5, B, K) for the kernels, which leave the candidates and their distances to the view."""
-        shape = len(view.row), self._candidates
-        whole, real = np.empty((2, *shape), np.int64), np.empty((5, *shape))
-        view.remember_nearest(whole[0], real[0], self._ring_m)
-        return whole, real
-
-    def _fill(self, view: View, rows, out, scratch) -> np.ndarray:
-        return self._run(_encode_candidates, self._scenario.radio.battery_j, view, rows, out, scratch)
-
-    def _run(self, kernel, terms, view: View, rows, out, scratch) -> np.ndarray:
-        threads = threads_for(rows, self._threads)
-        over_rows(kernel, len(rows), threads, self._constants, view.knowledge.handle, terms, rows, *scratch, out)
+    def _fill(self, view: View, rows, expected: Expected, out) -> np.ndarray:
+        threads, found = threads_for(rows, self._threads), (rows, self._candidates, expected.table)
+        arguments = self._constants, view.knowledge.handle, self._terms(view), found, out
+        over_rows(self._encode, len(rows), threads, *arguments)
         return out
+
+    def _terms(self, view: View) -> Any:
+        return self._scenario.radio.battery_j
 
 
 class MenuObservation(CandidatesObservation):
     """Flat Box float32: BELIEF_FEATURES, then ENTRY_FEATURES of each entry of the menu: what it promises."""
 
     features: tuple[str, ...] = ENTRY_FEATURES
+    depth, kernel = REPORTS_AHEAD, _encode_menu
 
     def __init__(self, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> None:
         super().__init__(scenario, order, candidates, threads)
         self.shape: tuple[int, int] = (MENU_ENTRIES, len(self.features))
         self.space: spaces.Box = spaces.Box(-BOUND, BOUND, (G + MENU_ENTRIES * self.shape[1],), np.float32)
-        self._order = order
+        self._by = ORDERS.index(order)
 
-    def _fill(self, view: View, rows, out, scratch) -> np.ndarray:
-        terms = self._scenario.typical_energy_mj, ORDERS.index(self._order), self._scenario.typical_cost(view.lam)
-        return self._run(_encode_menu, terms, view, rows, out, scratch)
+    def _terms(self, view: View) -> Any:
+        return self._scenario.typical_energy_mj, self._by, self._scenario.typical_cost(view.lam)
 
 
 class DictObservation:

@@ -1,17 +1,15 @@
 """What each entry of the menu promises: the belief, the energy and the cluster that a choice would leave."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from wsn_env.compiled.elementary import expected_error, log
 from wsn_env.compiled.kernels import lean_piece
-from wsn_env.envs.merit import awake_j, chance_of, fill_chances, gain, known_chance, place_of
-from wsn_env.models.field import squared_distance
-from wsn_env.models.measurement.base import chance, node_of, packets_a_report
+from wsn_env.envs.expectations import Outlook
+from wsn_env.envs.features import Heading
+from wsn_env.envs.merit import PositionCov, gain, position_cov, report_way, squared_between
 from wsn_env.models.radio.base import reception, transmission
-from wsn_env.models.state import Sensors
-from wsn_env.simulation.messages import outside
 
 ENTRY_FEATURES = (
     "standing",  # 1: the cluster as it is
@@ -31,197 +29,164 @@ ENTRY_FEATURES = (
     "head_distance",
     "head_detection",
 )
-AHEAD = 3.0  # periods
+WIDTH = len(ENTRY_FEATURES)
+
+
+class Units(NamedTuple):
+    """What costs are told in."""
+
+    cost_m: float  # the scenario's typical cost at the row's lam
+    energy_mj: float  # its typical energy
+
+
+class Tally(NamedTuple):
+    """Of the nodes of a cluster counted so far."""
+
+    p: PositionCov  # expected after their reports
+    energy_mj: float  # expected
+    detections: float  # expected
+    silence: float  # probability that no report comes
+    missed_ahead: float  # probability that none detects AHEAD periods on
 
 
 @lean_piece
-def foresee(sensors: Sensors, known: Any, m: Any, p: Any, c: Any) -> None:
-    """Fill in what is `known` of the candidates, of a row's Sensors: (K,) nodes, -1 for none, and room (K,) for their
-    chances of detection now and AHEAD periods on."""
-    nodes, chances, later = known
-    fill_chances(sensors, nodes, m, p, c, chances)
-    for k in range(len(nodes)):
-        later[k] = _chance_later(sensors, nodes[k], m, p, c) if nodes[k] >= 0 else -1.0
-
-
-@lean_piece
-def describe_standing(
-    sensors: Sensors,
-    standing: Any,
-    members: np.ndarray,
-    known: Any,
-    m: Any,
-    p: Any,
-    way: Any,
-    numbers: Any,
-    c: Any,
-    f: np.ndarray,
-) -> None:
-    """Fill f with ENTRY_FEATURES of the standing cluster.
+def describe_standing(outlook: Outlook, heading: Heading, units: Units, c: Any, f: np.ndarray) -> None:
+    """Fill f with ENTRY_FEATURES of the standing cluster; without a head all but `standing` and `sd` are 0.
 
     Args:
-        standing, members: the row's NETWORK and its members; without a head all features but `sd` are 0.
-        known: of the candidates, by `foresee`.
-        m, p: predicted mean and covariance; way: direction of its velocity.
-        numbers: lam [m/mJ], the scenario's typical cost at lam [m], its typical energy [mJ].
+        outlook: to the depth REPORTS_AHEAD.
+        heading: of the predicted velocity.
+        c: the scenario's common constants.
     """
     f[:] = 0.0
     f[0] = 1.0
-    after, energy, sums = _begin(p), 0.0, (0.0, 1.0, 1.0)
-    if standing.head >= 0:
-        after, energy, sums = _add_head(sensors, standing.head, standing.head, known, m, p, after, sums, c)
-        for k in range(standing.n_members):
-            after, price, sums = _add(sensors, members[k], standing.head, False, known, m, p, after, sums, c)
-            energy += price
-        _write_head(sensors, standing.head, known, m, p, way, c, f)
-    _write(standing.n_members, 0, p, after, energy, sums, numbers, f)
+    head, tally = outlook.candidates, _nobody(outlook)
+    if outlook.nodes[head].node >= 0:
+        tally = _with_head(tally, outlook, head, c.radio)
+        for k in range(head + 1, len(outlook.nodes)):
+            tally = _with_member(tally, outlook, k, head, False, c.radio)
+        _write_head(outlook, head, heading, c.radius_m, f)
+    _write(len(outlook.nodes) - head - 1, 0, tally, outlook, units, f)
 
 
 @lean_piece
 def describe_entries(
-    sensors: Sensors,
-    standing: Any,
-    members: np.ndarray,
-    known: Any,
-    nodes: np.ndarray,
-    head: int,
-    m: Any,
-    p: Any,
-    way: Any,
-    numbers: Any,
-    c: Any,
-    width: int,
-    entries: np.ndarray,
+    outlook: Outlook, ranking: np.ndarray, leader: int, heading: Heading, units: Units, c: Any, entries: np.ndarray
 ) -> None:
-    """Fill entries (N * width,) with ENTRY_FEATURES of the head and the first n further nodes, n = 0..N - 1.
+    """Fill entries (N * width,) with ENTRY_FEATURES of the leader and the first 0..N - 1 further candidates.
 
     Args:
-        nodes: (K,) candidates in order of merit, -1: none; the head may be among them.
-        head: who would lead, alive; -1: nobody could.
+        ranking: (K,) RANKED, the candidates in order of merit; the leader may be among them.
+        leader: its place among the outlook's nodes; -1: nobody could lead.
+        The rest: as `describe_standing`.
     """
-    old, count = standing.head, standing.n_members
-    after, energy, sums = _begin(p), 0.0, (0.0, 1.0, 1.0)
-    if head >= 0:
-        after, energy, sums = _add_head(sensors, head, old, known, m, p, after, sums, c)
+    nodes, tally, old = outlook.nodes, _nobody(outlook), outlook.nodes[outlook.candidates].node
+    head = np.int64(-1)
+    if leader >= 0:
+        head = nodes[leader].node
+        tally = _with_head(tally, outlook, leader, c.radio)
     slot, invited = 0, 0
-    for n in range(len(entries) // width):
-        f = entries[n * width : (n + 1) * width]
+    for n in range(len(entries) // WIDTH):
+        f = entries[n * WIDTH : (n + 1) * WIDTH]
         f[:] = 0.0
         if n > 0 and head >= 0:
-            while slot < len(nodes) and (nodes[slot] == head or nodes[slot] < 0):
+            while slot < len(ranking) and (ranking[slot].place < 0 or nodes[ranking[slot].place].node == head):
                 slot += 1
-            if slot < len(nodes):
-                node = nodes[slot]
+            if slot < len(ranking):
+                place = ranking[slot].place
                 slot += 1
-                awake = node == old or place_of(node, members[:count]) >= 0
-                called = not awake or (c.radio.to_head and head != old)  # a new head calls all of them
-                after, price, sums = _add(sensors, node, head, called, known, m, p, after, sums, c)
-                energy += price
+                # A new head calls all of them.
+                called = (c.radio.to_head and head != old) or not stands(outlook, nodes[place].node)
+                tally = _with_member(tally, outlook, place, leader, called, c.radio)
                 invited += called
         f[1] = 1.0 if head != old else 0.0
         if head >= 0:
-            _write_head(sensors, head, known, m, p, way, c, f)
-        _write(n, invited, p, after, energy, sums, numbers, f)
+            _write_head(outlook, leader, heading, c.radius_m, f)
+        _write(n, invited, tally, outlook, units, f)
 
 
 @lean_piece
-def _begin(p):
-    """Position covariance before any report."""
-    return p[0, 0], p[0, 2], p[2, 2]
+def stands(outlook: Outlook, node: int) -> bool:
+    """Whether a node is part of the standing cluster."""
+    found = False
+    for k in range(outlook.candidates, len(outlook.nodes)):
+        found |= outlook.nodes[k].node == node
+    return found
 
 
 @lean_piece
-def _chance_later(sensors, node, m, p, c):
-    """Of detecting the target AHEAD periods on, if it keeps its velocity."""
-    t = AHEAD * c.period_s
-    pxx = p[0, 0] + t * (2.0 * p[0, 1] + t * p[1, 1])
-    pxy = p[0, 2] + t * (p[0, 3] + p[1, 2] + t * p[1, 3])
-    pyy = p[2, 2] + t * (2.0 * p[2, 3] + t * p[3, 3])
-    place = node_of(sensors, node)
-    return chance(c.measurement, place, m[0] + t * m[1], m[2] + t * m[3], pxx, pxy, pyy, c)
+def _nobody(outlook):
+    return Tally(position_cov(outlook.cov), 0.0, 0.0, 1.0, 1.0)
 
 
 @lean_piece
-def _chances(sensors, node, known, m, p, c):
-    """Of any node, now and AHEAD periods on."""
-    nodes, chances, later = known
-    k = place_of(node, nodes)
-    if k >= 0:
-        return chances[k], later[k]
-    return chance_of(sensors, node, m, p, c), _chance_later(sensors, node, m, p, c)
+def _counted(tally, node, arrival, joules):
+    """The tally with one node more."""
+    return Tally(
+        gain(node, arrival, tally.p)[1],
+        tally.energy_mj + 1e3 * joules,
+        tally.detections + node.detection,
+        tally.silence * (1.0 - node.detection * arrival),
+        tally.missed_ahead * (1.0 - node.detection_ahead),
+    )
 
 
 @lean_piece
-def _count(sums, detection, arrival, later):
-    """Expected detections, probability of silence, and of none AHEAD periods on, with one node more."""
-    return sums[0] + detection, sums[1] * (1.0 - detection * arrival), sums[2] * (1.0 - later)
+def _with_head(tally, outlook, leader, r):
+    """The head's own report, and the handover to it."""
+    head, old = outlook.nodes[leader], outlook.nodes[outlook.candidates]
+    joules = r.awake_j - r.asleep_j
+    if not r.to_head:
+        joules += _report_j(head, outlook, leader, r)
+    elif old.node >= 0 and head.node != old.node:
+        squared = squared_between(old, head)
+        hops = max(np.ceil(np.sqrt(squared) / r.hop_m), 1.0)
+        joules += hops * (transmission(r, r.handover_bits, squared) + reception(r, r.handover_bits))
+    return _counted(tally, head, r.head_delivery, joules)
 
 
 @lean_piece
-def _add_head(sensors, head, old, known, m, p, after, sums, c):
-    """The head's own report, and the handover to it [mJ]."""
-    detection, later = _chances(sensors, head, known, m, p, c)
-    _, p00, p01, p11 = gain(detection * c.radio.head_delivery, sensors, head, m, p, after[0], after[1], after[2], c)
-    joules = awake_j(sensors, head, c)
-    if not c.radio.to_head:
-        joules += _report_j(sensors, head, head, detection, m, c)
-    elif old >= 0 and head != old:
-        squared = squared_distance(sensors.positions, old, sensors.positions[head, 0], sensors.positions[head, 1])
-        hops = max(np.ceil(np.sqrt(squared) / c.radio.hop_m), 1.0)
-        bits = c.radio.handover_bits
-        joules += hops * (transmission(c.radio, bits, squared) + reception(c.radio, bits))
-    return (p00, p01, p11), 1e3 * joules, _count(sums, detection, c.radio.head_delivery, later)
-
-
-@lean_piece
-def _add(sensors, node, head, called, known, m, p, after, sums, c):
-    """A member's report, its invitation if it is called, its being awake [mJ]."""
-    detection, later = _chances(sensors, node, known, m, p, c)
-    _, p00, p01, p11 = gain(detection * c.radio.delivery, sensors, node, m, p, after[0], after[1], after[2], c)
-    joules = awake_j(sensors, node, c) + _report_j(sensors, node, head, detection, m, c)
+def _with_member(tally, outlook, place, leader, called, r):
+    """A member's report, its invitation if it is called, its being awake."""
+    node = outlook.nodes[place]
+    joules = r.awake_j - r.asleep_j + _report_j(node, outlook, leader, r)
     if called:
-        joules += reception(c.radio, c.radio.invitation_bits)
-        if c.radio.to_head:
-            squared = squared_distance(sensors.positions, node, sensors.positions[head, 0], sensors.positions[head, 1])
-            joules += transmission(c.radio, c.radio.invitation_bits, squared)
-    return (p00, p01, p11), 1e3 * joules, _count(sums, detection, c.radio.delivery, later)
+        joules += reception(r, r.invitation_bits)
+        if r.to_head:
+            joules += transmission(r, r.invitation_bits, squared_between(node, outlook.nodes[leader]))
+    return _counted(tally, node, r.delivery, joules)
 
 
 @lean_piece
-def _report_j(sensors, node, head, detection, m, c):
+def _report_j(node, outlook, leader, r):
     """Expected energy of a report with its retries [J]."""
-    if c.radio.to_head:
-        x, y, hearing = sensors.positions[head, 0], sensors.positions[head, 1], reception(c.radio, c.radio.report_bits)
-    else:
-        x, y = outside(m, c.radio)
-        hearing = 0.0
-    r = c.radio
+    hearing = reception(r, r.report_bits) if r.to_head else 0.0
     tries = r.delivery / r.packet_success if r.packet_success > 0.0 else float(r.tries)
-    sending = transmission(c.radio, c.radio.report_bits, squared_distance(sensors.positions, node, x, y))
-    return packets_a_report(c.measurement) * detection * tries * (sending + hearing)
+    sending = transmission(r, r.report_bits, report_way(node, outlook, leader, r))
+    return node.packets * node.detection * tries * (sending + hearing)
 
 
 @lean_piece
-def _write_head(sensors, head, known, m, p, way, c, f):
-    dx, dy = (sensors.positions[head, 0] - m[0]) / c.radius_m, (sensors.positions[head, 1] - m[2]) / c.radius_m
-    f[12] = dx * way[0] + dy * way[1]
-    f[13] = dy * way[0] - dx * way[1]
+def _write_head(outlook, leader, heading, radius_m, f):
+    head, mean = outlook.nodes[leader], outlook.mean
+    dx, dy = (head.x - mean[0]) / radius_m, (head.y - mean[2]) / radius_m
+    f[12] = dx * heading.x + dy * heading.y
+    f[13] = dy * heading.x - dx * heading.y
     f[14] = np.sqrt(dx * dx + dy * dy)
-    f[15] = known_chance(sensors, head, known[0], known[1], m, p, c)
+    f[15] = head.detection
 
 
 @lean_piece
-def _write(n, invited, p, after, energy, sums, numbers, f):
-    lam, unit, typical_mj = numbers
-    before = max(p[0, 0] + p[2, 2], 1e-12)
-    left = max(after[0] + after[2], 1e-12)
+def _write(n, invited, tally, outlook, units, f):
+    before = max(outlook.cov[0, 0] + outlook.cov[2, 2], 1e-12)
+    left = max(tally.p.xx + tally.p.yy, 1e-12)
     f[2] = 0.25 * n
     f[3] = 0.25 * invited
     f[4] = 0.5 * log(left)
     f[5] = 0.5 * log(left / before)
-    f[6] = expected_error(after[0], after[1], after[2]) / unit
-    f[7] = lam * energy / unit
-    f[8] = np.sqrt(energy / typical_mj)
-    f[9] = 0.25 * sums[0]
-    f[10] = sums[1]
-    f[11] = 1.0 - sums[2]
+    f[6] = expected_error(tally.p.xx, tally.p.xy, tally.p.yy) / units.cost_m
+    f[7] = outlook.lam * tally.energy_mj / units.cost_m
+    f[8] = np.sqrt(tally.energy_mj / units.energy_mj)
+    f[9] = 0.25 * tally.detections
+    f[10] = tally.silence
+    f[11] = 1.0 - tally.missed_ahead

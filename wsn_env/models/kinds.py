@@ -23,7 +23,7 @@ from numba.extending import overload
 
 from wsn_env.compiled.arrays import record
 from wsn_env.compiled.kernels import fast, lean_piece, piece
-from wsn_env.compiled.stamp import stamp
+from wsn_env.compiled.stamp import plain_function, stamp
 from wsn_env.models.quantity import ScenarioError, Section
 
 if TYPE_CHECKING:
@@ -62,15 +62,18 @@ class Kind(Section):
                 )
 
 
-_marked: dict[str, type[Kind]] = {}  # kinds by the mark in the type of their constants
+_marked: dict[str, type[Kind]] = {}  # kinds by the mark in the type of their constants; of those alike, any
 
 
 def constants_type(kind: Kind, scenario: Scenario) -> np.dtype[np.void]:
-    """The type of a kind's record of constants: its mark, and the constants by name."""
+    """The type of a kind's record of constants: its mark, and the constants by name.
+
+    Kinds that do the same (by settings alone do the shipped radios differ) have one type, so that one kernel does.
+    """
     kind.check_functions()
     numbers = kind.constants(scenario)
     own: Any = type(kind)  # mypy takes no class of dataclasses for hashable
-    mark = f"{own.__name__}_{_code_stamp(own)}"
+    mark = f"{kind.role.replace(' ', '_')}_{_code_stamp(own)}"
     _marked[mark] = own
     return record([(mark, "i1"), *((name, _number_type(value)) for name, value in numbers.items())])
 
@@ -88,7 +91,9 @@ def _number_type(value) -> str:
 @cache
 def _code_stamp(kind: type[Kind]) -> str:
     own = {name: getattr(kind, name, None) for name in (*kind.required, *kind.optional)}
-    return stamp(*(function for function in own.values() if function is not None), more=sorted(own))
+    named = {name: plain_function(function) for name, function in own.items()}
+    found = {name: function for name, function in sorted(named.items()) if function is not None}
+    return stamp(*found.values(), more=[(name, f.__module__, f.__qualname__) for name, f in found.items()])
 
 
 def by_kind(function: Callable[..., Any]) -> Any:

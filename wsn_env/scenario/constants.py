@@ -46,6 +46,15 @@ def constants(scenario: Scenario) -> np.ndarray:
     return known[1].copy()
 
 
+def common_constants(scenario: Scenario) -> np.ndarray:
+    """The record, an array of one, of what matters beside the measurement: most scenarios' have one type."""
+    radio = constants_type(scenario.radio, scenario)
+    made = np.zeros(1, record([("radio", radio), ("radius_m", "f8"), ("equal_everywhere", "i8")]))
+    fill_constants(made["radio"], scenario.radio, scenario)
+    made["radius_m"], made["equal_everywhere"] = scenario.radius_m, scenario.measurement.equal_everywhere
+    return made
+
+
 _made: dict[int, tuple[ref, np.ndarray]] = {}  # by scenario
 
 

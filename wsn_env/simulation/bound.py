@@ -16,7 +16,7 @@ Both are made of the truth: for loggers and tables, never for policies.
 import numpy as np
 
 from wsn_env.compiled.arrays import record
-from wsn_env.compiled.kernels import lean_kernel, lean_piece, over_rows, threads_for
+from wsn_env.compiled.kernels import Pinned, lean_kernel, lean_piece, over_rows, threads_for
 from wsn_env.models.detection.base import detects, stream_of
 from wsn_env.models.measurement.base import linearise, node_at
 from wsn_env.models.motion.prediction import predict_covariance
@@ -90,7 +90,7 @@ class Bound:
         if scenario.detection.values_decide:
             self._constants["reach_m"] = np.inf  # noise lifts a level over the threshold from anywhere
         self._asked_first = scenario.tracking.start == "search"
-        self._memory = np.zeros(rows, MEMORY)
+        self._memory, self._advance = np.zeros(rows, MEMORY), Pinned(_advance)
 
     def begin(self, state: State, rows: np.ndarray | None = None) -> np.ndarray:
         """New episodes; a search in period 0 counts.
@@ -118,7 +118,7 @@ class Bound:
         rows = len(self._memory)
         bound_m = np.empty(rows)
         threads = 1 if rows < MANY_ROWS else self._threads
-        over_rows(_advance, rows, threads, self._constants, outcome.row, state.handle, self._memory, bound_m)
+        over_rows(self._advance, rows, threads, self._constants, outcome.row, state.handle, self._memory, bound_m)
         return bound_m
 
     def episode_m(self) -> np.ndarray:

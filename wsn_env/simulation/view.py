@@ -23,7 +23,7 @@ class View:
     """The network's knowledge before it chooses the cluster of the next period; all arrays lead with B."""
 
     knowledge: Knowledge
-    _nearest: dict[Any, Any] = field(default_factory=dict, repr=False)
+    derived: dict[Any, Any] = field(default_factory=dict, repr=False)  # what has been found out from it, kept
 
     @property
     def row(self) -> np.ndarray:
@@ -167,13 +167,10 @@ class View:
     def nearest(self, count: int, ring_m: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """The living nodes nearest to the prediction, or to a ring about it: (B, count) nodes, -1 for none, and their
         distances to the prediction [m]."""
-        if (count, ring_m) not in self._nearest:
-            self._nearest[count, ring_m] = geometry.nearest(self.network, self.prediction, count, ring_m)
-        return self._nearest[count, ring_m]
-
-    def remember_nearest(self, nodes: np.ndarray, distances: np.ndarray, ring_m: float = 0.0) -> None:
-        """What a kernel has found in passing."""
-        self._nearest[nodes.shape[1], ring_m] = nodes, distances
+        key = "nearest", count, ring_m
+        if key not in self.derived:
+            self.derived[key] = geometry.nearest(self.network, self.prediction, count, ring_m)
+        return self.derived[key]
 
     def nearest_living(self) -> np.ndarray:
         """(B,) the living node nearest to the prediction; -1: none is alive."""

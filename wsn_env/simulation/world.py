@@ -35,7 +35,7 @@ class World:
         self.scenario: Scenario = scenario
         self.threads: int = threads or available_threads()
         self.tracker: Tracker = make_tracker(scenario, self.threads, fast)
-        self._run = kernels.fast(period.run) if fast else period.run
+        self._run = kernels.Pinned(kernels.fast(period.run) if fast else period.run)
         self._constants = constants(scenario)
         self._tracks, self._packets = episode.Tracks(scenario), scenario.measurement.packets_of(scenario)
         self._start, self._placed = episode.start_record(scenario), episode.placed_nodes(scenario)

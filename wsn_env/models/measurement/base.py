@@ -80,8 +80,6 @@ class Measurement(Kind):
         "finds_target",
         "log_miss",
         "chance",
-        "informs",
-        "equal_everywhere",
         "packets_a_report",
         "weigh_period",
         "foretell",
@@ -90,7 +88,9 @@ class Measurement(Kind):
     )
 
     values: ClassVar[int] = 1  # numbers of a report
-    reports_state: ClassVar[bool] = False  # whether nodes remember a state and report how it stands
+    equal_everywhere: ClassVar[bool] = False  # whether a report tells the same wherever its node stands
+    reports_state: ClassVar[bool] = False  # whether nodes remember a state and report how it stands, so that silence
+    # tells as much as a report
     lasting_errors: ClassVar[bool] = False  # whether errors are alike from period to period, so that silence tells
     # nothing and a tracker has to learn them
     order: ClassVar[Order] = "information"  # the menu's order of merit that suits it
@@ -242,16 +242,6 @@ class Measurement(Kind):
         return mean_probability(c.detection, c.measurement, x - node.x, y - node.y, xx, xy, yy)
 
     @staticmethod
-    def informs(m: Any, detection: float) -> float:
-        """Probability that a node's being awake tells what `linearise` says; here that of its detecting."""
-        return detection
-
-    @staticmethod
-    def equal_everywhere(m: Any) -> bool:
-        """Whether a report tells the same wherever its node stands."""
-        return False
-
-    @staticmethod
     def packets_a_report(m: Any) -> float:
         """How many packets long a report is, on average."""
         return 1.0
@@ -338,8 +328,6 @@ take_note: Any = by_kind(Measurement.take_note)
 finds_target: Any = by_kind(Measurement.finds_target)
 log_miss: Any = by_kind(Measurement.log_miss)
 chance: Any = by_kind(Measurement.chance)
-informs: Any = by_kind(Measurement.informs)
-equal_everywhere: Any = by_kind(Measurement.equal_everywhere)
 packets_a_report: Any = by_kind(Measurement.packets_a_report)
 weigh_period: Any = by_kind(Measurement.weigh_period)
 foretell: Any = by_kind(Measurement.foretell)

@@ -118,11 +118,6 @@ class Binary(Measurement):
         return found
 
     @staticmethod
-    def informs(m: Any, detection: float) -> float:
-        """Silence tells as much as a report."""
-        return 1.0
-
-    @staticmethod
     def linearise(m: Any, node: Any, x: float, y: float, xx: float, xy: float, yy: float) -> tuple[Any, ...]:
         """One bit as a linear measurement along the way to the node: the noise leaves the same expected variance.
 

@@ -21,6 +21,7 @@ class Position(Measurement):
 
     allocates: ClassVar[bool] = False
     values: ClassVar[int] = 2
+    equal_everywhere: ClassVar[bool] = True
     order: ClassVar[Order] = "nearest"
 
     def fixes(self, values: np.ndarray, places: np.ndarray, radius_m: float) -> tuple[np.ndarray, float]:
@@ -55,7 +56,3 @@ class Position(Measurement):
     def signal(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> float:
         dx, dy = node.x - x, node.y - y
         return -(dx * dx + dy * dy)
-
-    @staticmethod
-    def equal_everywhere(m: Any) -> bool:
-        return True

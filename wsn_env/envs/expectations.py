@@ -1,0 +1,202 @@
+"""What the belief expects of nodes in the period to come: how likely a report is, and what one would tell.
+
+Here features, the menu and its orders of merit meet the kinds. What comes after works on these numbers alone, and is
+compiled once for all measurements.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wsn_env.compiled.arrays import record
+from wsn_env.compiled.kernels import Pinned, every_row, lean_kernel, lean_piece, over_rows, threads_for
+from wsn_env.models.measurement.base import chance, linearise, node_of, packets_a_report
+from wsn_env.models.state import knowledge_at, sensors_of
+from wsn_env.scenario import Scenario
+from wsn_env.scenario.constants import constants
+from wsn_env.simulation.geometry import find_candidates
+from wsn_env.simulation.view import View
+
+AHEAD = 3.0  # periods
+NUMBERS = 2  # of a report, at most
+
+EXPECTED = record(
+    [
+        ("node", "i8"),  # -1: none
+        ("x", "f8"),  # m
+        ("y", "f8"),
+        ("distance_m", "f8"),  # of a candidate, to the prediction
+        ("detection", "f8"),  # probability that it has something to report
+        ("detection_ahead", "f8"),  # the same AHEAD periods on, if the target keeps its velocity
+        ("silence_informs", "i8"),  # 1: its silence tells as much as its report
+        ("packets", "f8"),  # how many packets long a report is
+        ("numbers", "i8"),  # of a report; each linearised about the prediction:
+        ("slope_x", "f8", NUMBERS),  # per m
+        ("slope_y", "f8", NUMBERS),
+        ("variance", "f8", NUMBERS),  # of its noise
+        ("price_m", "f8"),  # what an order of merit charges for it
+        ("open", "i8"),  # 1: still to be ordered
+    ]
+)
+
+PLACES, REPORTS, REPORTS_AHEAD = range(3)  # how much is asked: where nodes stand; their reports too; those AHEAD too
+
+
+class Expected(NamedTuple):
+    """What is expected in every row."""
+
+    nodes: np.ndarray  # (B, K) candidates, -1: none
+    distances: np.ndarray  # (B, K) to the prediction [m], inf: none
+    table: np.ndarray  # (B, K + 1 + M) EXPECTED: of the candidates, the standing head and its members
+    depth: int
+
+
+class Outlook(NamedTuple):
+    """What a row's network expects of the period to come, for kernels."""
+
+    nodes: np.ndarray  # (K + 1 + n,) EXPECTED: of the candidates; of the standing head, its node -1 if there is none;
+    # of its members
+    candidates: int  # K: the standing head's place among the nodes
+    mean: np.ndarray  # (4,) predicted
+    cov: np.ndarray  # (4, 4)
+    lam: float  # m/mJ
+
+
+class Expectations:
+    """Of a scenario's views: what the K candidates and the standing cluster are expected to report."""
+
+    def __init__(self, scenario: Scenario, candidates: int, threads: int = 1) -> None:
+        self._constants, self._ring_m = constants(scenario), scenario.ring_m
+        self._candidates, self._threads = candidates, threads
+        self._expect = Pinned(_expect)
+        self._key = "expected", candidates, scenario.ring_m
+        self._members = candidates  # for which there is room; more when more are met
+
+    def of(self, view: View, depth: int) -> Expected:
+        """Of a view's nearest candidates; kept with it.
+
+        Args:
+            depth: PLACES, REPORTS or REPORTS_AHEAD.
+        """
+        known = view.derived.get(self._key)
+        if known is None or known.depth < depth:
+            shape = len(view.row), self._candidates
+            candidates = np.empty(shape, np.int64), np.empty(shape)
+            known = self._fill(view, every_row(shape[0]), Expected(*candidates, self._table(*shape), depth), True)
+            self._keep(view, known)
+        return known
+
+    def renew(self, view: View, depth: int, rows: np.ndarray, before: View) -> Expected:
+        """What `of` gives, for less where only some rows (B,) have changed since the view `before`."""
+        old = before.derived.get(self._key)
+        if old is None or old.depth < depth or old.table.shape[1] < self._candidates + 1 + self._members:
+            return self.of(view, depth)
+        copy = Expected(old.nodes.copy(), old.distances.copy(), old.table.copy(), old.depth)
+        known = self._fill(view, rows, copy, True)
+        self._keep(view, known)
+        return known
+
+    def of_nodes(self, view: View, nodes: np.ndarray, depth: int) -> Expected:
+        """Of given candidates (B, K)."""
+        shape = nodes.shape
+        made = Expected(np.ascontiguousarray(nodes, np.int64), np.zeros(shape), self._table(*shape), depth)
+        return self._fill(view, every_row(shape[0]), made, False)
+
+    def _keep(self, view, known: Expected) -> None:
+        view.derived[self._key] = known
+        view.derived["nearest", self._candidates, self._ring_m] = known.nodes, known.distances
+
+    def _table(self, rows: int, candidates: int) -> np.ndarray:
+        return np.empty((rows, candidates + 1 + self._members), EXPECTED)
+
+    def _fill(self, view, rows, known: Expected, find: bool) -> Expected:
+        handle, asked, found = view.knowledge.handle, (known.depth, find), known[:3]
+        threads = threads_for(rows, self._threads)
+        if over_rows(self._expect, len(rows), threads, self._constants, handle, asked, rows, found):
+            self._members = int(view.network.n_members.max())
+            wider = known._replace(table=self._table(*known.nodes.shape))
+            return self._fill(view, every_row(len(rows)), wider, find)
+        return known
+
+
+@lean_kernel
+def _expect(start, stop, cs, handle, asked, rows, found):
+    """Fill in an Expected, only in the rows marked.
+
+    Args:
+        handle: of what the network knows (Knowledge).
+        asked: the depth; whether the candidates have to be found, too.
+        rows: (B,) bool.
+        found: nodes, distances and table of the Expected.
+
+    Returns: in how many rows more members stand than the table has room for.
+    """
+    known, c, crowded = knowledge_at(handle), cs[0], 0
+    depth, find = asked
+    for b in range(start, stop):
+        if rows[b]:
+            nodes, distances, own = found[0][b], found[1][b], found[2][b]
+            mean, standing, count = known.belief[b].predicted_mean, known.network.row[b], len(nodes)
+            if find:
+                find_candidates(known.network, b, mean[0], mean[2], c.ring_m, nodes, distances)
+            for k in range(count):
+                _expect_node(known, b, nodes[k], depth, c, own[k])
+                own[k].distance_m = distances[k]
+            if count + 1 + standing.n_members > len(own):
+                crowded += 1
+                continue
+            for k in range(-1, standing.n_members):
+                node = standing.head if k < 0 else np.int64(known.network.members[b, k])
+                place = place_of(node, nodes)
+                if place >= 0:
+                    own[count + 1 + k] = own[place]
+                else:
+                    _expect_node(known, b, node, depth, c, own[count + 1 + k])
+    return crowded
+
+
+@lean_piece
+def _expect_node(known, b, node, depth, c, e):
+    e.node = node
+    if node < 0:
+        return
+    place, m, p = node_of(sensors_of(known, b), node), known.belief[b].predicted_mean, known.belief[b].predicted_cov
+    e.x, e.y = place.x, place.y
+    if depth >= REPORTS:
+        e.detection = chance(c.measurement, place, m[0], m[2], p[0, 0], p[0, 2], p[2, 2], c)
+        e.silence_informs = known.reports.bitmap.shape[1] > 0
+        e.packets = packets_a_report(c.measurement)
+        lines = linearise(c.measurement, place, m[0], m[2], p[0, 0], p[0, 2], p[2, 2])
+        e.numbers = min(len(lines), NUMBERS)
+        for k in range(e.numbers):
+            e.slope_x[k], e.slope_y[k], e.variance[k] = lines[k].slope_x, lines[k].slope_y, lines[k].variance
+    if depth >= REPORTS_AHEAD:
+        t = AHEAD * c.period_s
+        xx = p[0, 0] + t * (2.0 * p[0, 1] + t * p[1, 1])
+        xy = p[0, 2] + t * (p[0, 3] + p[1, 2] + t * p[1, 3])
+        yy = p[2, 2] + t * (2.0 * p[2, 3] + t * p[3, 3])
+        e.detection_ahead = chance(c.measurement, place, m[0] + t * m[1], m[2] + t * m[3], xx, xy, yy, c)
+
+
+@lean_piece
+def place_of(node: Any, nodes: np.ndarray) -> int:
+    """Where a node stands among others; -1: nowhere, or no node."""
+    if node >= 0:
+        for k in range(len(nodes)):
+            if nodes[k] == node:
+                return k
+    return -1
+
+
+@lean_piece
+def outlook_of(known: Any, b: int, candidates: int, table: np.ndarray) -> Outlook:
+    """The Outlook of row b of what the network knows (Knowledge).
+
+    Args:
+        candidates: K.
+        table: of Expected.
+    """
+    belief, end = known.belief[b], candidates + 1 + known.network.row[b].n_members
+    return Outlook(table[b, :end], candidates, belief.predicted_mean, belief.predicted_cov, known.row[b].lam)
