@@ -118,13 +118,11 @@ class Arrays:
         raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}")
 
 
-@cache
-def _names(cls: Any) -> tuple[str, ...]:
+def _names_of(cls: Any) -> tuple[str, ...]:
     return tuple(item.name for item in fields(cls))
 
 
-@cache
-def _leaves(cls: Any) -> list[tuple[str, np.dtype, int, Callable[[Any], np.ndarray]]]:
+def _leaves_of(cls: Any) -> list[tuple[str, np.dtype, int, Callable[[Any], np.ndarray]]]:
     """Name, type of the elements and dimensions of every array, and what reads it."""
     found: list[Any] = []
     for item in fields(cls):
@@ -136,6 +134,10 @@ def _leaves(cls: Any) -> list[tuple[str, np.dtype, int, Callable[[Any], np.ndarr
         else:
             found.append((item.name, about["dtype"], len(about["axes"]), attrgetter(item.name)))
     return found
+
+
+_names: Any = cache(_names_of)  # Any: mypy takes no class of dataclasses for hashable
+_leaves: Any = cache(_leaves_of)
 
 
 def _layout(cls: type[Arrays]) -> list:
