@@ -14,7 +14,7 @@ from wsn_env.compiled import draws
 from wsn_env.compiled.kernels import kernel, lean_piece, piece
 from wsn_env.filters.kernels import redraw_row
 from wsn_env.filters.resampling import correlated, lower_root
-from wsn_env.models.measurement.base import linearise, node_at, unwrap
+from wsn_env.models.measurement.base import PositionBelief, at_point, linearise, node_at, unwrap
 from wsn_env.models.motion.prediction import advance
 from wsn_env.models.state import Belief, Network, Reports, State, knowledge_at, state_at
 from wsn_env.scenario import Scenario
@@ -150,8 +150,9 @@ def _correct_rows(cs, beliefs, positions, count, node, value):
         mean[:], cov[:] = beliefs[b].predicted_mean, beliefs[b].predicted_cov
         for j in range(count[b]):
             place = node_at(positions[b], node[b, j])
-            for k in range(len(linearise(m, place, mean[0], mean[2], cov[0, 0], cov[0, 2], cov[2, 2]))):
-                line = linearise(m, place, mean[0], mean[2], cov[0, 0], cov[0, 2], cov[2, 2])[k]
+            for k in range(len(linearise(m, place, at_point(0.0, 0.0)))):
+                target = PositionBelief(mean[0], mean[2], cov[0, 0], cov[0, 2], cov[2, 2])
+                line = linearise(m, place, target)[k]
                 innovation = unwrap(m, value[b, j, k], line.expected) - line.expected
                 _correct(mean, cov, line.slope_x, line.slope_y, innovation, max(line.variance, 1e-12))
 

@@ -27,8 +27,8 @@ class Bearing(Measurement):
         return {"sd": math.radians(self.sd_deg), "near2": self.near_m**2}
 
     @staticmethod
-    def sample(m, stream, number, node, x, y):
-        noise, _ = draws.normal_pair(stream, number)
+    def sample(m, stream, node, x, y):
+        noise, _ = draws.normal_pair(stream, node.number)
         angle = math.atan2(y - node.y, x - node.x) + m.sd * noise
         return angle - WHOLE * math.floor(angle / WHOLE + 0.5), 0.0
 
@@ -39,8 +39,8 @@ class Bearing(Measurement):
         return -0.5 * (off / m.sd) ** 2
 
     @staticmethod
-    def linearise(m, node, x, y, xx, xy, yy):
-        dx, dy = x - node.x, y - node.y
+    def linearise(m, node, belief):
+        dx, dy = belief.x - node.x, belief.y - node.y
         squared = max(dx * dx + dy * dy, m.near2)  # d angle = (dx dy' - dy dx') / d^2
         return (Line(math.atan2(dy, dx), -dy / squared, dx / squared, m.sd * m.sd),)
 

@@ -1,11 +1,13 @@
 """Binary sensors in the world: who reports, what the sink knows, what it costs; the particle filter on the bitmap."""
 
+from dataclasses import replace
+
 import numba
 import numpy as np
 import pytest
 
 from wsn_env import Cluster, Scenario, View, World
-from wsn_env.models.measurement.base import node_at, weigh, weigh_period
+from wsn_env.models.measurement.base import AtHead, node_at, weigh, weigh_period
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.models.state import state_at
 from wsn_env.scenario.constants import constants
@@ -181,15 +183,18 @@ NOBODY = ()  # has reported
 
 def weigh_states(x, log_weights, state, bitmap, nodes, cs):
     """The weights (P,) by a bitmap (S,) of which some nodes have just reported."""
-    told = state.copy()
-    told.reports.bitmap[0], told.reports.count[0], told.reports.node[0, : len(nodes)] = bitmap, len(nodes), nodes
-    _weigh_period(x, log_weights, told.handle, cs, np.zeros((0, 0, 0), np.float32), np.empty_like(log_weights))
+    reports = state.reports.copy()
+    reports.bitmap[0], reports.count[0], reports.node[0, : len(nodes)] = bitmap, len(nodes), nodes
+    belief = replace(state.belief, particles=x[None].copy(), log_weights=log_weights[None].copy())
+    heard = replace(state, reports=reports, belief=belief)
+    _weigh_period(heard.handle, cs, np.zeros((0, 0, 0), np.float32), np.empty_like(log_weights))
+    log_weights[:] = belief.log_weights[0]
 
 
 @numba.njit
-def _weigh_period(x, log_weights, handle, cs, maps, scratch):
+def _weigh_period(handle, cs, maps, scratch):
     state, c = state_at(handle), cs[0]
-    weigh_period(c.measurement, x, log_weights, state.belief, state.network, state.reports, 0, c, maps, scratch)
+    weigh_period(c.measurement, AtHead(state.belief, state.network, state.reports, 0), c, maps, scratch)
 
 
 @numba.njit

@@ -13,7 +13,7 @@ from wsn_env import Scenario, World, make_policy
 from wsn_env.compiled import draws
 from wsn_env.compiled.arrays import record
 from wsn_env.filters.linear import LinearModel
-from wsn_env.models import Line, Measurement, ScenarioError
+from wsn_env.models import Line, Measurement, Node, ScenarioError
 from wsn_env.models.detection.base import detects, mean_probability, probability, stream_of
 from wsn_env.models.field import squared_distance
 from wsn_env.models.kinds import constants_type, fill_constants
@@ -36,10 +36,17 @@ def scenario_of(name: str) -> Scenario:
 
 
 @njit
-def _samples(cs, places, x, y, out):
+def numbered(number, places):
+    """A node where the first of some stands, whose random numbers are those of another."""
     node = node_at(places, 0)
+    return Node(number, node.x, node.y, node.learnt)
+
+
+@njit
+def _samples(cs, places, x, y, out):
     for i in range(len(out)):
-        out[i, 0], out[i, 1] = sample(cs[0].measurement, draws.stream(np.uint64(5), 1, 5), i, node, x, y)
+        node = numbered(i, places)
+        out[i, 0], out[i, 1] = sample(cs[0].measurement, draws.stream(np.uint64(5), 1, 5), node, x, y)
 
 
 @njit
@@ -121,7 +128,7 @@ def _detection(cs, distances, places, out):
         out[0, i] = probability(d, m, distances[i])
         count, stream = 0, stream_of(d, np.uint64(9), 2 + i)
         for number in range(2000):
-            count += detects(d, m, stream, number, node_at(places, 0), places[0, 0] + distances[i], places[0, 1])
+            count += detects(d, m, stream, numbered(number, places), places[0, 0] + distances[i], places[0, 1])
         out[1, i] = count / 2000
         out[2, i] = mean_probability(d, m, distances[i], 0.0, 1e-10, 0.0, 1e-10)
 
@@ -188,7 +195,7 @@ class Halfway(Measurement):
     """It has no linearise."""
 
     @staticmethod
-    def sample(m, stream, number, node, x, y):
+    def sample(m, stream, node, x, y):
         return x, 0.0
 
     @staticmethod
@@ -204,8 +211,8 @@ def test_a_kind_that_lacks_a_function_is_refused_when_the_environment_is_made():
         log_likelihood = None
 
         @staticmethod
-        def linearise(m, node, x, y, xx, xy, yy):
-            return (Line(x, 1.0, 0.0, 1.0),)
+        def linearise(m, node, belief):
+            return (Line(belief.x, 1.0, 0.0, 1.0),)
 
     with pytest.raises(ScenarioError, match=r"Silent has no log_likelihood"):
         gym.make("wsn_env/PreDC-v0", measurement=Silent())

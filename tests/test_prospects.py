@@ -10,7 +10,7 @@ from wsn_env.envs.actions import MENU_ENTRIES
 from wsn_env.envs.features import BELIEF_FEATURES
 from wsn_env.envs.interface import Interface, Settings
 from wsn_env.envs.prospects import ENTRY_FEATURES
-from wsn_env.models.measurement.base import chance, node_at
+from wsn_env.models.measurement.base import PositionBelief, chance, node_at
 from wsn_env.scenario.constants import constants
 
 ROWS = 4000
@@ -66,7 +66,7 @@ def test_energy_silence_and_detections_come_as_promised(name, sd_m):
 
 @numba.njit
 def chance_of(cs, positions, node, x, y, xx, xy, yy):
-    return chance(cs[0].measurement, node_at(positions, node), x, y, xx, xy, yy, cs[0])
+    return chance(cs[0].measurement, node_at(positions, node), PositionBelief(x, y, xx, xy, yy), cs[0])
 
 
 def test_the_expected_sd_is_that_of_a_kalman_filter_whose_reports_may_be_missed():

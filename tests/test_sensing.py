@@ -116,7 +116,7 @@ def measured(cs, target, positions, count):
     out = np.empty((count, 2))
     for i in range(count):
         stream = draws.stream(np.uint64(1), i, draws.MEASUREMENT)
-        out[i] = measure(cs[0].measurement, stream, 0, node_at(positions, 0), target[0], target[2])
+        out[i] = measure(cs[0].measurement, stream, node_at(positions, 0), target[0], target[2])
     return out
 
 
@@ -203,7 +203,7 @@ def test_the_probability_of_silence_against_sampling(ceiling):
 
 @numba.njit
 def silence(mean, cov, positions, nodes, count, head, cs):
-    return log_miss(cs[0].measurement, mean, cov, positions, head, nodes, count, cs[0])
+    return log_miss(cs[0].measurement, mean, cov, positions, head, nodes[:count], cs[0])
 
 
 def test_the_probability_of_silence_when_nobody_is_awake():

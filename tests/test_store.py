@@ -125,7 +125,7 @@ def test_an_edit_of_a_kind_compiles_what_uses_the_kind(folder):
             @dataclass(frozen=True)
             class Own(Measurement):
                 @staticmethod
-                def sample(m, stream, number, node, x, y):
+                def sample(m, stream, node, x, y):
                     return x, 0.0
 
                 @staticmethod
@@ -133,9 +133,9 @@ def test_an_edit_of_a_kind_compiles_what_uses_the_kind(folder):
                     return -((value - x) ** 2)
 
                 @staticmethod
-                def linearise(m, node, x, y, xx, xy, yy):
+                def linearise(m, node, belief):
                     '''About a point.'''
-                    return (Line(x + OFFSET, 1.0, 0.0, 1.0),)
+                    return (Line(belief.x + OFFSET, 1.0, 0.0, 1.0),)
 
             for measurement in (Own(), "position"):
                 model = LinearModel(Scenario.named("PreDC-v0", measurement=measurement))

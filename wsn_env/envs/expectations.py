@@ -12,7 +12,7 @@ import numpy as np
 
 from wsn_env.compiled.arrays import record
 from wsn_env.compiled.kernels import Pinned, every_row, lean_kernel, lean_piece, over_rows, threads_for
-from wsn_env.models.measurement.base import chance, linearise, node_of, packets_a_report
+from wsn_env.models.measurement.base import PositionBelief, chance, linearise, node_of, packets_a_report
 from wsn_env.models.state import knowledge_at, sensors_of
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import constants
@@ -165,10 +165,11 @@ def _expect_node(known, b, node, depth, c, e):
     place, m, p = node_of(sensors_of(known, b), node), known.belief[b].predicted_mean, known.belief[b].predicted_cov
     e.x, e.y = place.x, place.y
     if depth >= REPORTS:
-        e.detection = chance(c.measurement, place, m[0], m[2], p[0, 0], p[0, 2], p[2, 2], c)
+        target = PositionBelief(m[0], m[2], p[0, 0], p[0, 2], p[2, 2])
+        e.detection = chance(c.measurement, place, target, c)
         e.silence_informs = known.reports.bitmap.shape[1] > 0
         e.packets = packets_a_report(c.measurement)
-        lines = linearise(c.measurement, place, m[0], m[2], p[0, 0], p[0, 2], p[2, 2])
+        lines = linearise(c.measurement, place, target)
         e.numbers = min(len(lines), NUMBERS)
         for k in range(e.numbers):
             e.slope_x[k], e.slope_y[k], e.variance[k] = lines[k].slope_x, lines[k].slope_y, lines[k].variance
@@ -177,7 +178,8 @@ def _expect_node(known, b, node, depth, c, e):
         xx = p[0, 0] + t * (2.0 * p[0, 1] + t * p[1, 1])
         xy = p[0, 2] + t * (p[0, 3] + p[1, 2] + t * p[1, 3])
         yy = p[2, 2] + t * (2.0 * p[2, 3] + t * p[3, 3])
-        e.detection_ahead = chance(c.measurement, place, m[0] + t * m[1], m[2] + t * m[3], xx, xy, yy, c)
+        later = PositionBelief(m[0] + t * m[1], m[2] + t * m[3], xx, xy, yy)
+        e.detection_ahead = chance(c.measurement, place, later, c)
 
 
 @lean_piece

@@ -12,7 +12,7 @@ import numpy as np
 
 from wsn_env.compiled.kernels import kernel, over_rows, piece
 from wsn_env.filters.base import MomentTracker
-from wsn_env.models.measurement.base import linearise, node_at, unwrap
+from wsn_env.models.measurement.base import at_point, linearise, node_at, unwrap
 from wsn_env.models.motion.prediction import predict_moments
 from wsn_env.models.state import Belief, Network, Reports
 from wsn_env.scenario import Scenario
@@ -90,12 +90,12 @@ def _expect_about(x, y, positions, nodes, value, c):
     variance of the noise: (m,) each, all numbers of a node's value one after the other."""
     size = 0
     for node in nodes:
-        size += len(linearise(c.measurement, node_at(positions, node), x, y, 0.0, 0.0, 0.0))
+        size += len(linearise(c.measurement, node_at(positions, node), at_point(x, y)))
     about, told, variance = np.empty(size), np.empty(size), np.empty(size)
     i = 0
     for j in range(len(nodes)):
         k = 0
-        for line in linearise(c.measurement, node_at(positions, nodes[j]), x, y, 0.0, 0.0, 0.0):
+        for line in linearise(c.measurement, node_at(positions, nodes[j]), at_point(x, y)):
             about[i], variance[i] = line.expected, line.variance
             told[i] = unwrap(c.measurement, value[j, k], line.expected)
             i, k = i + 1, k + 1
@@ -108,7 +108,7 @@ def _expect(state, positions, nodes, about, c, out):
     i = 0
     for node in nodes:
         place = node_at(positions, node)
-        for line in linearise(c.measurement, place, state[0], state[2], 0.0, 0.0, 0.0):
+        for line in linearise(c.measurement, place, at_point(state[0], state[2])):
             out[i] = unwrap(c.measurement, line.expected, about[i])
             i += 1
 

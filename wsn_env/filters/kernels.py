@@ -16,7 +16,7 @@ from wsn_env.compiled.kernels import kernel, lean_kernel, lean_piece, piece
 from wsn_env.filters.likelihood import weigh_awake
 from wsn_env.filters.resampling import REACH, correlated, lower_root, resample, spread_copies
 from wsn_env.filters.walkers import scatter_walkers, walk
-from wsn_env.models.measurement.base import weigh_period
+from wsn_env.models.measurement.base import AtHead, weigh_period
 from wsn_env.models.measurement.beacon_levels import draw_biases
 from wsn_env.models.state import belief_at, network_at, reports_at
 
@@ -203,16 +203,18 @@ def make_scratch(particles: int) -> Any:
 
 
 @piece
-def filter_row(
-    key: Any, period: int, belief: Any, network: Any, reports: Any, b: int, c: Any, maps: np.ndarray, scratch: Any
-) -> Any:
-    """One period of row b: `period` counts from 1; the belief is that after the period before.
+def filter_row(key: Any, period: int, head: AtHead, c: Any, maps: np.ndarray, scratch: Any) -> Any:
+    """One period of one row.
 
     Args:
+        key: of the episode.
+        period: counts from 1.
+        head: the belief is that after the period before.
         maps: of the measurement's `residual_maps`.
 
     Returns: whether the particles were resampled.
     """
+    belief, network, reports, b = head
     x, log_weights, row = belief.particles[b], belief.log_weights[b], belief.row[b]
     weights, slots, states = scratch.weights, scratch.slots, scratch.states
     n, count = x.shape[1], reports.count[b]
@@ -220,7 +222,7 @@ def filter_row(
         walk(draws.stream(key, period, draws.PROCESS), x, c.tracking)
     else:
         predict(draws.stream(key, period, draws.PROCESS), x, c.period_s, c.tracking.q)
-    weigh_period(c.measurement, x, log_weights, belief, network, reports, b, c, maps, weights)
+    weigh_period(c.measurement, head, c, maps, weights)
     if c.tracking.silent_information:
         weigh_awake(x, log_weights, network, reports.node[b, :count], b, c)
     normalise(log_weights, weights)
@@ -250,19 +252,17 @@ def redraw_row(key: Any, period: int, belief: Any, b: int) -> None:
 
 @kernel
 def filter_rows(
-    start: int,
-    stop: int,
-    cs: Any,
-    maps: np.ndarray,
-    keys: np.ndarray,
-    periods: np.ndarray,
-    resampled: np.ndarray,
-    belief_handle: np.ndarray,
-    reports_handle: np.ndarray,
-    network_handle: np.ndarray,
+    start: int, stop: int, cs: Any, maps: np.ndarray, times: Any, handles: Any, resampled: np.ndarray
 ) -> None:
-    """One period of the filter alone."""
-    belief, reports, network = belief_at(belief_handle), reports_at(reports_handle), network_at(network_handle)
+    """One period of the filter alone.
+
+    Args:
+        times: keys (B,) and periods (B,).
+        handles: of the beliefs, the networks and the reports.
+        resampled: (B,) bool, filled.
+    """
+    keys, periods = times
+    belief, network, reports = belief_at(handles[0]), network_at(handles[1]), reports_at(handles[2])
     scratch = make_scratch(belief.particles.shape[2])
     for b in range(start, stop):
-        resampled[b] = filter_row(keys[b], periods[b], belief, network, reports, b, cs[0], maps, scratch)
+        resampled[b] = filter_row(keys[b], periods[b], AtHead(belief, network, reports, b), cs[0], maps, scratch)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wsn_env.compiled.kernels import kernel
-from wsn_env.models.measurement.base import linearise, node_at, unwrap
+from wsn_env.models.measurement.base import at_point, linearise, node_at, unwrap
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import constants
 
@@ -68,7 +68,7 @@ class LinearModel:
 @kernel
 def _linearise(cs, x, y, places, values, told, expected, slopes, variances):
     for i in range(len(places)):
-        lines = linearise(cs[0].measurement, node_at(places, i), x, y, 0.0, 0.0, 0.0)
+        lines = linearise(cs[0].measurement, node_at(places, i), at_point(x, y))
         k = 0
         for line in lines:
             expected[i, k], variances[i, k] = line.expected, line.variance

@@ -50,6 +50,6 @@ class ParticleTracker:
         resampled: np.ndarray,
     ) -> None:
         """Predict, weigh, read mean and covariance, resample, in place."""
-        handles = belief.handle, reports.handle, network.handle
-        own = self._constants, self.maps
-        over_rows(self._filter_rows, len(keys), self.threads, *own, keys, periods, resampled, *handles)
+        handles = belief.handle, network.handle, reports.handle
+        arguments = self._constants, self.maps, (keys, periods), handles, resampled
+        over_rows(self._filter_rows, len(keys), self.threads, *arguments)

@@ -6,7 +6,7 @@ import numpy as np
 
 from wsn_env.compiled.kernels import kernel
 from wsn_env.filters.base import MemorylessTracker
-from wsn_env.models.measurement.base import linearise, node_at
+from wsn_env.models.measurement.base import at_point, linearise, node_at
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import constants
 
@@ -62,7 +62,7 @@ def _fit_point(cs, nodes, strengths, point, cov):
         a, b, d, u, v = RIDGE, 0.0, RIDGE, 0.0, 0.0  # the normal equations (a b; b d) step = (u, v)
         for i in range(len(strengths)):
             place = node_at(nodes, i)
-            line = linearise(c.measurement, place, point[0], point[1], 0.0, 0.0, 0.0)[0]
+            line = linearise(c.measurement, place, at_point(point[0], point[1]))[0]
             noise = np.sqrt(line.variance)
             beyond, hx, hy = (strengths[i] - line.expected) / noise, line.slope_x / noise, line.slope_y / noise
             a += hx * hx

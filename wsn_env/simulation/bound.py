@@ -18,7 +18,7 @@ import numpy as np
 from wsn_env.compiled.arrays import record
 from wsn_env.compiled.kernels import Pinned, lean_kernel, lean_piece, over_rows, threads_for
 from wsn_env.models.detection.base import detects, stream_of
-from wsn_env.models.measurement.base import linearise, node_at
+from wsn_env.models.measurement.base import at_point, linearise, node_at
 from wsn_env.models.motion.prediction import predict_covariance
 from wsn_env.models.state import Outcome, State, state_at
 from wsn_env.scenario import Scenario
@@ -204,7 +204,7 @@ def _take_period(own, xx, xy, yy, c):
 def _information(node, positions, x, y, c):
     """H' R^-1 H of one report about the position: its xx, xy and yy [1/m^2]."""
     xx, xy, yy = 0.0, 0.0, 0.0
-    for line in linearise(c.measurement, node_at(positions, node), x, y, 0.0, 0.0, 0.0):
+    for line in linearise(c.measurement, node_at(positions, node), at_point(x, y)):
         weight = 1.0 / line.variance
         xx += weight * line.slope_x * line.slope_x
         xy += weight * line.slope_x * line.slope_y
@@ -233,7 +233,7 @@ def _information_of_all(state, b, period, c):
     for line in range(first, last + 1):
         for slot in range(starts[line * place.side + left], starts[line * place.side + right + 1]):
             node = grid.nodes[b, slot]
-            if detects(c.detection, c.measurement, stream, node, node_at(positions, node), x, y):
+            if detects(c.detection, c.measurement, stream, node_at(positions, node), x, y):
                 one = _information(node, positions, x, y, c)
                 xx, xy, yy = xx + one[0], xy + one[1], yy + one[2]
     return xx, xy, yy

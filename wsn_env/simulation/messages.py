@@ -3,11 +3,10 @@
 A radio reaches every node at a price that grows with distance (eq. 5); a modem sends over one hop at one price. Reports
 may be lost and are tried again (assumption d of Xiang & Guo, 2013); control packets always arrive. A sink in the middle
 of the field and the target's own node have energy of their own, so that only the network's side counts: who reports to
-them pays for sending, who is called by them pays for hearing it. All pieces work on row b of the state; `out` is the
-row's record of the period (OUTCOME), `r` the radio's constants.
+them pays for sending, who is called by them pays for hearing it. `r` are the radio's constants.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,9 +19,18 @@ from wsn_env.models.radio.base import reception, relayed, transmission
 SENSING, HANDOVER, INVITATION, REPORT, BROADCAST, SEARCH = np.arange(6)
 
 
+class Episode(NamedTuple):
+    """One of a batch of episodes, in a period."""
+
+    state: Any  # State of all of them
+    b: int  # its row
+    out: Any  # its OUTCOME
+
+
 @lean_piece
-def spend(node: Any, joules: float, purpose: Any, state: Any, out: Any, b: int) -> bool:
+def spend(node: Any, joules: float, purpose: Any, episode: Episode) -> bool:
     """Charge a node; what it cannot pay empties it. Returns whether it could pay in full."""
+    state, b, out = episode
     battery, ledger = state.network.battery[b], state.ledger
     before = battery[node]
     battery[node] = max(before - joules, 0.0)
@@ -52,21 +60,23 @@ def in_one_hop(node: Any, other: Any, positions: np.ndarray, r: Any) -> bool:
 
 
 @lean_piece
-def send(sender: Any, receiver: Any, bits: float, purpose: Any, state: Any, out: Any, b: int, r: Any) -> bool:
+def send(sender: Any, receiver: Any, bits: float, purpose: Any, episode: Episode, r: Any) -> bool:
     """One packet from node to node (eq. 5). Returns whether both could pay, so that it arrived if not lost."""
+    state, b = episode.state, episode.b
     positions, battery = state.network.positions[b], state.network.battery[b]
     squared = squared_distance(positions, sender, positions[receiver, 0], positions[receiver, 1])
-    if battery[sender] <= 0.0 or not spend(sender, transmission(r, bits, squared), purpose, state, out, b):
+    if battery[sender] <= 0.0 or not spend(sender, transmission(r, bits, squared), purpose, episode):
         return False
-    return battery[receiver] > 0.0 and spend(receiver, reception(r, bits), purpose, state, out, b)
+    return battery[receiver] > 0.0 and spend(receiver, reception(r, bits), purpose, episode)
 
 
 @lean_piece
-def send_out(sender: Any, x: float, y: float, bits: float, purpose: Any, state: Any, out: Any, b: int, r: Any) -> bool:
+def send_out(sender: Any, x: float, y: float, bits: float, purpose: Any, episode: Episode, r: Any) -> bool:
     """One packet from a node to (x, y), out of the network (eq. 5). Returns whether the node could pay."""
+    state, b = episode.state, episode.b
     squared = squared_distance(state.network.positions[b], sender, x, y)
     living = state.network.battery[b, sender] > 0.0
-    return living and spend(sender, transmission(r, bits, squared), purpose, state, out, b)
+    return living and spend(sender, transmission(r, bits, squared), purpose, episode)
 
 
 @lean_piece
@@ -77,7 +87,7 @@ def outside(mean: np.ndarray, r: Any) -> tuple[float, float]:
 
 
 @lean_piece
-def report(node: Any, head: Any, packets: float, purpose: Any, state: Any, out: Any, b: int, r: Any) -> bool:
+def report(node: Any, head: Any, packets: float, purpose: Any, episode: Episode, r: Any) -> bool:
     """A node's report with its retries. Returns whether it was received; to the head its own is free.
 
     Args:
@@ -85,6 +95,7 @@ def report(node: Any, head: Any, packets: float, purpose: Any, state: Any, out: 
 
     Beyond one hop nothing is sent: after a search the new head may lie so far, for a modem.
     """
+    state, b = episode.state, episode.b
     positions = state.network.positions[b]
     if r.to_head:
         x, y = positions[head, 0], positions[head, 1]
@@ -98,9 +109,9 @@ def report(node: Any, head: Any, packets: float, purpose: Any, state: Any, out: 
     stream = draws.stream(state.key[b], state.row[b].period, packet)
     for attempt in range(r.tries):
         if r.to_head:
-            sent = send(node, head, packets * r.report_bits, purpose, state, out, b, r)
+            sent = send(node, head, packets * r.report_bits, purpose, episode, r)
         else:
-            sent = send_out(node, x, y, packets * r.report_bits, purpose, state, out, b, r)
+            sent = send_out(node, x, y, packets * r.report_bits, purpose, episode, r)
         if not sent:
             return False
         if draws.uniform(stream, 16 * node + attempt) < r.packet_success:
@@ -109,8 +120,9 @@ def report(node: Any, head: Any, packets: float, purpose: Any, state: Any, out: 
 
 
 @lean_piece
-def broadcast(state: Any, out: Any, b: int, r: Any) -> None:
+def broadcast(episode: Episode, r: Any) -> None:
     """The head's word to resample: one transmission as far as the farthest living member, who all pay to hear it."""
+    state, b = episode.state, episode.b
     network = state.network
     head, nodes, count = network.row[b].head, network.members[b], network.row[b].n_members
     positions, battery = network.positions[b], network.battery[b]
@@ -121,38 +133,40 @@ def broadcast(state: Any, out: Any, b: int, r: Any) -> None:
             farthest = max(farthest, squared)
     if farthest < 0.0 or battery[head] <= 0.0:
         return
-    if spend(head, transmission(r, r.broadcast_bits, farthest), BROADCAST, state, out, b):
+    if spend(head, transmission(r, r.broadcast_bits, farthest), BROADCAST, episode):
         for k in range(count):
             if battery[nodes[k]] > 0.0:
-                spend(np.int64(nodes[k]), reception(r, r.broadcast_bits), BROADCAST, state, out, b)
+                spend(np.int64(nodes[k]), reception(r, r.broadcast_bits), BROADCAST, episode)
 
 
 @lean_piece
-def _hand_over(old, head, state, out, b, r):
+def _hand_over(old, head, episode, r):
     """The old head's packet to the new one; beyond one hop it is relayed, and the old head pays for its relays.
 
     Returns: as `send`.
     """
+    state, b = episode.state, episode.b
     positions, battery = state.network.positions[b], state.network.battery[b]
     squared = squared_distance(positions, old, positions[head, 0], positions[head, 1])
-    if battery[old] <= 0.0 or not spend(old, relayed(r, r.handover_bits, squared), HANDOVER, state, out, b):
+    if battery[old] <= 0.0 or not spend(old, relayed(r, r.handover_bits, squared), HANDOVER, episode):
         return False
-    return battery[head] > 0.0 and spend(head, reception(r, r.handover_bits), HANDOVER, state, out, b)
+    return battery[head] > 0.0 and spend(head, reception(r, r.handover_bits), HANDOVER, episode)
 
 
 @lean_piece
-def take_over(head: Any, state: Any, out: Any, b: int, r: Any) -> bool:
+def take_over(head: Any, episode: Episode, r: Any) -> bool:
     """An awake node leads, alone as yet. Returns whether the head's role was handed over: a sink or the target needs no
     head, so that the node is one like the others there."""
+    state, b = episode.state, episode.b
     standing = state.network.row[b]
     old = standing.head
     standing.head = head
     standing.n_members = 0
-    return r.to_head and old >= 0 and old != head and _hand_over(old, head, state, out, b, r)
+    return r.to_head and old >= 0 and old != head and _hand_over(old, head, episode, r)
 
 
 @lean_piece
-def form(head: Any, chosen: np.ndarray, count: int, state: Any, out: Any, b: int, r: Any) -> bool:
+def form(head: Any, chosen: np.ndarray, count: int, episode: Episode, r: Any) -> bool:
     """Make the chosen cluster the standing one: handover from the old head, invitations to new members.
 
     Only members that hear their invitation join. A new head invites all of them. A sink or the target calls only who
@@ -164,16 +178,17 @@ def form(head: Any, chosen: np.ndarray, count: int, state: Any, out: Any, b: int
 
     Returns: whether the head's role was handed over.
     """
+    state, b = episode.state, episode.b
     standing, members = state.network.row[b], state.network.members[b]
     old, old_count = standing.head, standing.n_members
     heads_call = r.to_head
-    handed = take_over(head, state, out, b, r)
+    handed = take_over(head, episode, r)
     price = reception(r, r.invitation_bits)
     called = not heads_call and head != old
     for k in range(old_count):
         called &= members[k] != head
     if called:
-        spend(head, price, INVITATION, state, out, b)
+        spend(head, price, INVITATION, episode)
     n, j = 0, 0
     for k in range(count):
         node = np.int64(chosen[k])
@@ -181,9 +196,9 @@ def form(head: Any, chosen: np.ndarray, count: int, state: Any, out: Any, b: int
             j += 1
         awake = node == old or (j < old_count and members[j] == node)
         if heads_call:
-            joins = (awake and head == old) or send(head, node, r.invitation_bits, INVITATION, state, out, b, r)
+            joins = (awake and head == old) or send(head, node, r.invitation_bits, INVITATION, episode, r)
         else:
-            joins = awake or spend(node, price, INVITATION, state, out, b)
+            joins = awake or spend(node, price, INVITATION, episode)
         if joins:
             chosen[n] = node  # n <= k: what is overwritten has been read
             n += 1

@@ -8,44 +8,56 @@ from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import expected_error
 from wsn_env.compiled.kernels import kernel, lean_kernel, lean_piece
 from wsn_env.filters.kernels import filter_row, make_scratch, redraw_row
-from wsn_env.models.measurement.base import Memory, finds_target, foretell, log_miss, news, node_at, take_note
+from wsn_env.models.measurement.base import (
+    AtHead,
+    Memory,
+    Occasion,
+    finds_target,
+    log_miss,
+    news,
+    node_at,
+    predict_reports,
+    take_note,
+)
 from wsn_env.models.motion.prediction import predict_moments, predict_walk
 from wsn_env.models.state import KEEP_CLUSTER, KEEP_HEAD, NOBODY, belief_at, state_at
 from wsn_env.simulation import messages
 from wsn_env.simulation.geometry import nearest_living
+from wsn_env.simulation.messages import Episode
 
 
 @kernel
-def run(
-    start: int,
-    stop: int,
-    cs: Any,
-    maps: np.ndarray,
-    heads: np.ndarray,
-    chosen: np.ndarray,
-    lost: np.ndarray,
-    outcomes: np.ndarray,
-    handle: np.ndarray,
-) -> int:
-    """A period with the particle filter at the head, up to where some rows must search; returns how many."""
+def run(start: int, stop: int, cs: Any, handle: np.ndarray, maps: np.ndarray, cluster: Any, results: Any) -> int:
+    """A period with the particle filter at the head, up to where some rows must search.
+
+    Args:
+        maps: of the measurement's `residual_maps`.
+        cluster: heads (B,) and members (B, M).
+        results: outcomes (B,) OUTCOME; lost (B,) bool, set where a search must follow.
+
+    Returns: how many rows are lost.
+    """
+    (heads, chosen), (outcomes, lost) = cluster, results
     state, c = state_at(handle), cs[0]
     scratch = make_scratch(state.belief.particles.shape[2])
     count = 0
     for b in range(start, stop):
         out = outcomes[b]
-        _sense_and_report(heads[b], chosen[b], state, out, b, c)
+        episode = Episode(state, b, out)
+        _sense_and_report(heads[b], chosen[b], episode, c)
         key, period = state.key[b], state.row[b].period
         if c.tracking.redraw and out.handover:
             redraw_row(key, period, state.belief, b)
-        resampled = filter_row(key, period, state.belief, state.network, state.reports, b, c, maps, scratch)
-        lost[b] = _conclude(resampled, state, out, b, c.radio, c.tracking)
+        head = AtHead(state.belief, state.network, state.reports, b)
+        resampled = filter_row(key, period, head, c, maps, scratch)
+        lost[b] = _conclude(resampled, episode, c.radio, c.tracking)
         count += lost[b]
-        foretell(c.measurement, state.belief, state.network.positions[b], b, c, maps, scratch.weights)
+        predict_reports(c.measurement, state.belief, state.network.positions[b], b, c, maps, scratch.weights)
     return count
 
 
 @kernel
-def foretell_rows(
+def predict_reports_of_rows(
     start: int, stop: int, cs: Any, rows: np.ndarray, maps: np.ndarray, belief_handle: np.ndarray, positions: np.ndarray
 ) -> None:
     """What each node should report next, in the rows marked, where the measurement says so."""
@@ -53,7 +65,7 @@ def foretell_rows(
     weights = np.empty(belief.particles.shape[2], np.float32)
     for b in range(start, stop):
         if rows[b]:
-            foretell(c.measurement, belief, positions[b], b, c, maps, weights)
+            predict_reports(c.measurement, belief, positions[b], b, c, maps, weights)
 
 
 @lean_kernel
@@ -63,7 +75,7 @@ def sense_and_report(
     """What comes before the correction, for a tracker that is not compiled."""
     state = state_at(handle)
     for b in range(start, stop):
-        _sense_and_report(heads[b], chosen[b], state, outcomes[b], b, cs[0])
+        _sense_and_report(heads[b], chosen[b], Episode(state, b, outcomes[b]), cs[0])
 
 
 @lean_kernel
@@ -73,7 +85,7 @@ def conclude(
     """What comes after it; returns how many rows must search."""
     state, count = state_at(handle), 0
     for b in range(start, stop):
-        lost[b] = _conclude(resampled[b], state, outcomes[b], b, cs[0].radio, cs[0].tracking)
+        lost[b] = _conclude(resampled[b], Episode(state, b, outcomes[b]), cs[0].radio, cs[0].tracking)
         count += lost[b]
     return count
 
@@ -86,14 +98,15 @@ def target_of(state: Any, b: int) -> tuple[float, float]:
 
 
 @lean_piece
-def _sense_and_report(head, chosen, state, out, b, c):
+def _sense_and_report(head, chosen, episode, c):
     """From the choice to the reports: cluster, target, detections, packets, and what was missed.
 
     A head that dies of what it receives still corrects with what it has heard until then.
     """
+    state, b = episode.state, episode.b
     network, reports = state.network, state.reports
     messages.clear_ledger(state.ledger, b)
-    _take_choice(head, chosen, state, out, b, c.radio)  # handover, invitations [J]
+    _take_choice(head, chosen, episode, c.radio)  # handover, invitations [J]
     state.row[b].period += 1
     target = target_of(state, b)  # moves
     reports.count[b] = 0
@@ -105,16 +118,17 @@ def _sense_and_report(head, chosen, state, out, b, c):
             place += 1
         for k in range(n + 1):
             node = head if k == place else members[k - (k > place)]
-            if wake(node, messages.SENSING, state, out, b, c.radio):
-                sense(node, head, messages.REPORT, target, state, out, b, c)
+            if wake(node, messages.SENSING, episode, c.radio):
+                sense(node, head, messages.REPORT, target, episode, c)
     if c.radio.asleep_j > 0.0:
-        _sleep(state, out, b, c.radio)
+        _sleep(episode, c.radio)
     _remember_miss(state, b, c)
 
 
 @lean_piece
-def _take_choice(head, chosen, state, out, b, r):
+def _take_choice(head, chosen, episode, r):
     """Drop what cannot serve, then form the cluster."""
+    state, b, out = episode
     network = state.network
     standing, battery, predicted = network.row[b], network.battery[b], state.belief.row[b].predicted_mean
     stands = standing.head >= 0 and battery[standing.head] > 0.0
@@ -146,7 +160,7 @@ def _take_choice(head, chosen, state, out, b, r):
                 kept += 1
             else:
                 out.dropped += 1
-    out.handover = messages.form(head, others, kept, state, out, b, r)
+    out.handover = messages.form(head, others, kept, episode, r)
     out.members = 1 + standing.n_members
 
 
@@ -173,14 +187,16 @@ def _list_living(chosen, battery, found):
 
 
 @lean_piece
-def wake(node: Any, purpose: Any, state: Any, out: Any, b: int, r: Any) -> bool:
+def wake(node: Any, purpose: Any, episode: Episode, r: Any) -> bool:
     """A node pays for being awake in this period. Returns whether it could."""
-    return state.network.battery[b, node] > 0.0 and messages.spend(node, r.awake_j, purpose, state, out, b)
+    state, b = episode.state, episode.b
+    return state.network.battery[b, node] > 0.0 and messages.spend(node, r.awake_j, purpose, episode)
 
 
 @lean_piece
-def _sleep(state, out, b, r):
+def _sleep(episode, r):
     """All living nodes outside the cluster pay for the period, too."""
+    state, b = episode.state, episode.b
     network, standing = state.network, state.network.row[b]
     battery, members, j = network.battery[b], network.members[b], 0
     for node in range(len(battery)):
@@ -188,24 +204,23 @@ def _sleep(state, out, b, r):
             j += 1
         awake = node == standing.head or (j < standing.n_members and members[j] == node)
         if not awake and battery[node] > 0.0:
-            messages.spend(node, r.asleep_j, messages.SENSING, state, out, b)
+            messages.spend(node, r.asleep_j, messages.SENSING, episode)
 
 
 @lean_piece
-def sense(node: Any, head: Any, purpose: Any, target: Any, state: Any, out: Any, b: int, c: Any) -> None:
+def sense(node: Any, head: Any, purpose: Any, target: Any, episode: Episode, c: Any) -> None:
     """An awake node's period: it reports what it has to tell, if anything."""
+    state, b, out = episode
     if state.network.battery[b, node] <= 0.0:
         return
     memory, reports = memory_of(state, b), state.reports
-    place = node_at(state.network.positions[b], node)
-    asked = purpose == messages.SEARCH
-    has_news, value, second, packets = news(
-        c.measurement, memory, state.key[b], state.row[b].period, node, place, target[0], target[1], asked, c
-    )
+    sensor = node_at(state.network.positions[b], node)
+    occasion = Occasion(state.key[b], state.row[b].period, purpose == messages.SEARCH)
+    has_news, value, second, packets = news(c.measurement, memory, occasion, sensor, target[0], target[1], c)
     if not has_news:
         return
     out.detections += 1
-    if messages.report(node, head, packets, purpose, state, out, b, c.radio):
+    if messages.report(node, head, packets, purpose, episode, c.radio):
         slot = reports.count[b]
         reports.node[b, slot] = node
         reports.value[b, slot, 0] = value
@@ -225,27 +240,26 @@ def memory_of(state: Any, b: int) -> Any:
 def _remember_miss(state, b, c):
     """How improbable the silence since the last report is, seen from the belief."""
     network, belief = state.network, state.belief.row[b]
-    standing, members, count = network.row[b], network.members[b], network.row[b].n_members
-    if finds_target(c.measurement, memory_of(state, b), state.reports.count[b], standing.head, members, count):
+    head, members = network.row[b].head, network.members[b, : network.row[b].n_members]
+    if finds_target(c.measurement, memory_of(state, b), state.reports.count[b], head, members):
         state.row[b].log_miss = 0.0
     else:
         mean, cov = belief.predicted_mean, belief.predicted_cov
-        state.row[b].log_miss += log_miss(
-            c.measurement, mean, cov, network.positions[b], standing.head, members, count, c
-        )
+        state.row[b].log_miss += log_miss(c.measurement, mean, cov, network.positions[b], head, members, c)
 
 
 @lean_piece
-def _conclude(resampled, state, out, b, r, t):
+def _conclude(resampled, episode, r, t):
     """After the correction: the broadcast, and the end of the period unless a search must come first; returns
     whether it must."""
+    state, b, out = episode
     if resampled and state.network.row[b].head >= 0:
         out.resampled = True
         if r.to_head:
-            messages.broadcast(state, out, b, r)
+            messages.broadcast(episode, r)
     lost = _is_lost(state, b, t)
     if not lost:
-        _settle(state, out, b, r, t)
+        _settle(episode, r, t)
     return lost
 
 
@@ -265,12 +279,13 @@ def settle(start: int, stop: int, cs: Any, rows: np.ndarray, outcomes: np.ndarra
     state = state_at(handle)
     for b in range(start, stop):
         if rows[b]:
-            _settle(state, outcomes[b], b, cs[0].radio, cs[0].tracking)
+            _settle(Episode(state, b, outcomes[b]), cs[0].radio, cs[0].tracking)
 
 
 @lean_piece
-def _settle(state, out, b, r, t):
+def _settle(episode, r, t):
     """The dead, the costs, and the prediction for the next period (eq. 16)."""
+    state, b, out = episode
     belief, target = state.belief.row[b], target_of(state, b)
     mean, cov = belief.mean, belief.cov
     _remove_dead_nodes(state.network, b, r)

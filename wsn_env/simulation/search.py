@@ -6,10 +6,11 @@ import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.kernels import lean_kernel, lean_piece
-from wsn_env.models.measurement.base import node_at, signal, tells
+from wsn_env.models.measurement.base import Occasion, node_at, signal, tells
 from wsn_env.models.radio.base import reception
 from wsn_env.models.state import state_at
 from wsn_env.simulation import messages
+from wsn_env.simulation.messages import Episode
 from wsn_env.simulation.period import sense, target_of, wake
 
 
@@ -30,16 +31,17 @@ def search(
         out = outcomes[b]
         out.searched = True
         state.row[b].last_search = state.row[b].period
-        strongest = _wake_all(state, out, b, c)
+        episode = Episode(state, b, out)
+        strongest = _wake_all(episode, c)
         if strongest >= 0:
             # The new head takes over (the velocity is handed to it) and hears the others.
-            if messages.take_over(strongest, state, out, b, c.radio):
+            if messages.take_over(strongest, episode, c.radio):
                 out.handover = True
             out.detections = 0
             state.reports.count[b] = 0
             target = target_of(state, b)
             for node in range(state.network.battery.shape[1]):
-                sense(node, strongest, messages.SEARCH, target, state, out, b, c)
+                sense(node, strongest, messages.SEARCH, target, episode, c)
             found[b] = _restart_at_centroid(state, b, c)
         else:  # asked, all keep silent
             state.sensed[b] = 0
@@ -47,31 +49,32 @@ def search(
 
 
 @lean_piece
-def _wake_all(state, out, b, c):
+def _wake_all(episode, c):
     """Wake-up call to all, sensing by those that slept.
 
     Returns: the living node with the strongest signal of the target, the first by number where signals are alike; -1:
     nobody detects it.
     """
+    state, b, out = episode
     network, standing = state.network, state.network.row[b]
     positions, battery, members = network.positions[b], network.battery[b], network.members[b]
-    key, period, target = state.key[b], state.row[b].period, target_of(state, b)
+    occasion, target = Occasion(state.key[b], state.row[b].period, True), target_of(state, b)
     call = reception(c.radio, c.radio.wakeup_bits)
-    measuring = draws.stream(key, period, draws.MEASUREMENT)
+    measuring = draws.stream(occasion.key, occasion.period, draws.MEASUREMENT)
     strongest, best, j = -1, -np.inf, 0
     out.members = 0
     for node in range(len(battery)):
         while j < standing.n_members and members[j] < node:
             j += 1
         awake = node == standing.head or (j < standing.n_members and members[j] == node)
-        if battery[node] <= 0.0 or not messages.spend(node, call, messages.SEARCH, state, out, b):
+        if battery[node] <= 0.0 or not messages.spend(node, call, messages.SEARCH, episode):
             continue
-        if not awake and not wake(node, messages.SEARCH, state, out, b, c.radio):
+        if not awake and not wake(node, messages.SEARCH, episode, c.radio):
             continue
         out.members += 1
-        place = node_at(positions, node)
-        if battery[node] > 0.0 and tells(c.measurement, key, period, node, place, target[0], target[1], c):
-            strength = signal(c.measurement, measuring, node, place, target[0], target[1])
+        sensor = node_at(positions, node)
+        if battery[node] > 0.0 and tells(c.measurement, occasion, sensor, target[0], target[1], c):
+            strength = signal(c.measurement, measuring, sensor, target[0], target[1])
             if strength > best:
                 strongest, best = node, strength
     return strongest

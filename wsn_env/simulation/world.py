@@ -89,7 +89,7 @@ class World:
         if self.scenario.measurement.lasting_errors:
             tracker: Any = self.tracker  # the particle filter: no other reads errors that last
             maps, belief = tracker.maps, state.belief
-            self._in_rows(rows, period.foretell_rows, maps, belief.handle, state.network.positions)
+            self._in_rows(rows, period.predict_reports_of_rows, maps, belief.handle, state.network.positions)
         return state, outcome
 
     def step(self, state: State, cluster: Cluster, donate: bool = False) -> tuple[State, Outcome]:
@@ -110,7 +110,7 @@ class World:
         # Handover and invitations; the target moves; members sense and report; the head predicts and corrects;
         # broadcast, costs, and the prediction for the next period, unless a row must search first.
         if isinstance(self.tracker, ParticleTracker):  # all in one compiled call
-            arguments = self._constants, self.tracker.maps, heads, members, lost, outcome.row, state.handle
+            arguments = self._constants, state.handle, self.tracker.maps, (heads, members), (outcome.row, lost)
             n_lost = over_rows(self._run, state.rows, self.threads, *arguments)
         else:
             self._over_rows(period.sense_and_report, heads, members, outcome.row, state.handle)

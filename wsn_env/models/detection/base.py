@@ -78,10 +78,10 @@ class DetectionRule(Kind):
         return draws.stream(key, period, draws.DETECTION)
 
     @staticmethod
-    def detects(d: Any, m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> bool:
-        """Whether node `number`, if awake, detects a target at (x, y)."""
+    def detects(d: Any, m: Any, stream: Any, node: Any, x: float, y: float) -> bool:
+        """Whether a node, if awake, detects a target at (x, y)."""
         dx, dy = node.x - x, node.y - y
-        return draws.uniform(stream, number) < probability(d, m, np.sqrt(dx * dx + dy * dy))
+        return draws.uniform(stream, node.number) < probability(d, m, np.sqrt(dx * dx + dy * dy))
 
     @staticmethod
     def weigh_detection(d: Any, m: Any, x: np.ndarray, log_weights: np.ndarray, node: Any) -> None:

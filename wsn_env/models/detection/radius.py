@@ -115,12 +115,12 @@ class Detection(DetectionRule):
         return d.ceiling * normal_cdf(sds / np.sqrt(1.0 + steepness * steepness * root * root * variance))
 
     @staticmethod
-    def detects(d: Any, m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> bool:
+    def detects(d: Any, m: Any, stream: Any, node: Any, x: float, y: float) -> bool:
         dx, dy = node.x - x, node.y - y
         squared = dx * dx + dy * dy
         if squared >= 1.000001 * d.reach_m * d.reach_m:
             return False
-        uniform = draws.uniform(stream, number)
+        uniform = draws.uniform(stream, node.number)
         return uniform < d.ceiling and uniform < probability(d, m, np.sqrt(squared))  # many draws need no eqs. 2-3
 
     @staticmethod

@@ -81,8 +81,8 @@ class Threshold(DetectionRule):
         return draws.stream(key, period, draws.MEASUREMENT)  # what decides is the measurement itself
 
     @staticmethod
-    def detects(d: Any, m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> bool:
-        return sample(m, stream, number, node, x, y)[0] > d.threshold_db
+    def detects(d: Any, m: Any, stream: Any, node: Any, x: float, y: float) -> bool:
+        return sample(m, stream, node, x, y)[0] > d.threshold_db
 
     @staticmethod
     def weigh_detection(d: Any, m: Any, x: np.ndarray, log_weights: np.ndarray, node: Any) -> None:

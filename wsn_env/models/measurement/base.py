@@ -35,9 +35,20 @@ class Line(NamedTuple):
     variance: float  # of its noise
 
 
+class PositionBelief(NamedTuple):
+    """Where a target is believed to be: mean and covariance of a normal position [m, m^2]."""
+
+    x: float
+    y: float
+    xx: float  # all three 0: it is there
+    xy: float
+    yy: float
+
+
 class Node(NamedTuple):
     """A node as its measurement knows it."""
 
+    number: Any  # int64
     x: float  # m
     y: float
     learnt: Line  # what the tracker has learnt that its next report should be, where errors last; else zeros
@@ -51,20 +62,38 @@ class Memory(NamedTuple):
     packets: np.ndarray  # (S, 2): mean level and number of the packets in reach
 
 
+class Occasion(NamedTuple):
+    """When a node senses."""
+
+    key: Any  # of the episode's random numbers
+    period: int
+    asked: bool  # whether the head is looking for a lost target
+
+
+class AtHead(NamedTuple):
+    """What a head has to correct its belief with."""
+
+    belief: Any  # Belief, of all rows
+    network: Any  # Network
+    reports: Any  # Reports
+    b: int  # the row
+
+
 @dataclass(frozen=True)
 class Measurement(Kind):
     """Base of what nodes measure.
 
     A kind has `sample` and `linearise`, and `log_likelihood` or else `weigh`:
 
-        sample(m, stream, number, node, x, y) -> (value, second value)
-            What node `number` measures of a target at (x, y); random numbers are draws of `stream` at `number`.
+        sample(m, stream, node, x, y) -> (value, second value)
+            What a node measures of a target at (x, y); random numbers are draws of `stream` at `node.number`.
         log_likelihood(m, value, second, node, x, y) -> log density of a measured value, but for a constant, at most 0
             For one particle at (x, y), float32.
-        linearise(m, node, x, y, xx, xy, yy) -> a tuple of `Line`s, one for each number of the value
-            About a target that is believed to be at (x, y) with covariance (xx, xy, yy); zeros: that is there.
+        linearise(m, node, belief) -> a tuple of `Line`s, one for each number of the value
+            About a target that is believed to be there.
 
-    `m` holds the kind's constants, `node` is a `Node`; all lengths in m. The functions after these have defaults.
+    `m` holds the kind's constants, `node` is a `Node`, `belief` a `PositionBelief`; all lengths in m. The functions
+    after these have defaults.
     """
 
     abstract: ClassVar[bool] = True
@@ -82,7 +111,7 @@ class Measurement(Kind):
         "chance",
         "packets_a_report",
         "weigh_period",
-        "foretell",
+        "predict_reports",
         "level",
         "level_slope",
     )
@@ -158,56 +187,48 @@ class Measurement(Kind):
         return value
 
     @staticmethod
-    def signal(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> float:
+    def signal(m: Any, stream: Any, node: Any, x: float, y: float) -> float:
         """How strong a node finds the target, for the choice of a head after a search: here alike everywhere."""
         return 0.0
 
     @staticmethod
-    def tells(m: Any, key: Any, period: int, number: int, node: Any, x: float, y: float, c: Any) -> bool:
+    def tells(m: Any, occasion: Occasion, node: Any, x: float, y: float, c: Any) -> bool:
         """Whether a node takes the target to be there: here, it detects it."""
-        return detects(c.detection, c.measurement, stream_of(c.detection, key, period), number, node, x, y)
+        stream = stream_of(c.detection, occasion.key, occasion.period)
+        return detects(c.detection, c.measurement, stream, node, x, y)
 
     @staticmethod
-    def news(
-        m: Any, memory: Any, key: Any, period: int, number: int, node: Any, x: float, y: float, asked: bool, c: Any
-    ) -> tuple[Any, ...]:
-        """What an awake node has to report.
+    def news(m: Any, memory: Memory, occasion: Occasion, node: Any, x: float, y: float, c: Any) -> tuple[Any, ...]:
+        """What an awake node has to report of a target at (x, y).
 
         Args:
             memory: of the row's nodes; the node's own may change.
-            asked: whether the head is looking for a lost target.
 
         Returns: whether it has anything, the two numbers of the value, how many packets long the report is.
         """
-        if not tells(m, key, period, number, node, x, y, c):
+        if not tells(m, occasion, node, x, y, c):
             return False, 0.0, 0.0, 1.0
-        value, second = sample(m, draws.stream(key, period, draws.MEASUREMENT), number, node, x, y)
+        stream = draws.stream(occasion.key, occasion.period, draws.MEASUREMENT)
+        value, second = sample(m, stream, node, x, y)
         return True, value, second, 1.0
 
     @staticmethod
-    def take_note(m: Any, memory: Any, number: int, value: Any) -> None:
+    def take_note(m: Any, memory: Memory, number: int, value: Any) -> None:
         """What the head keeps of a report that has come."""
 
     @staticmethod
-    def finds_target(m: Any, memory: Any, reports: Any, head: int, members: np.ndarray, count: int) -> bool:
+    def finds_target(m: Any, memory: Memory, reports: int, head: int, members: np.ndarray) -> bool:
         """Whether anything was heard of the target: here, any report.
 
         Args:
             reports: their number.
-            head, members, count: who is awake; head -1: nobody.
+            head, members: who is awake; head -1: nobody.
         """
         return reports > 0
 
     @staticmethod
     def log_miss(
-        m: Any,
-        mean: np.ndarray,
-        cov: np.ndarray,
-        positions: np.ndarray,
-        head: int,
-        members: np.ndarray,
-        count: int,
-        c: Any,
+        m: Any, mean: np.ndarray, cov: np.ndarray, positions: np.ndarray, head: int, members: np.ndarray, c: Any
     ) -> float:
         """Log of the probability that none of the awake nodes would have been heard, averaged over the belief.
 
@@ -216,7 +237,7 @@ class Measurement(Kind):
         Args:
             mean, cov: (4,), (4, 4) the belief about this period before its reports.
             positions: (S, 2).
-            head, members, count: who is awake; head -1: nobody.
+            head, members: who is awake; head -1: nobody.
         """
         a = np.sqrt(max(cov[0, 0], 1e-12))
         b = cov[0, 2] / a
@@ -228,7 +249,7 @@ class Measurement(Kind):
                 u, v = EXPECT_AT * i, EXPECT_AT * j
                 x, y = mean[0] + a * u, mean[2] + b * u + d * v
                 missed = 1.0
-                for k in range(-1 if head >= 0 else 0, count):
+                for k in range(-1 if head >= 0 else 0, len(members)):
                     node = head if k < 0 else members[k]
                     dx, dy = positions[node, 0] - x, positions[node, 1] - y
                     seen = probability(c.detection, c.measurement, np.sqrt(dx * dx + dy * dy))
@@ -237,8 +258,9 @@ class Measurement(Kind):
         return log(max(total, 1e-300))
 
     @staticmethod
-    def chance(m: Any, node: Any, x: float, y: float, xx: float, xy: float, yy: float, c: Any) -> float:
-        """Probability that a node has something to report of a target believed to be at (x, y), cov (xx, xy, yy)."""
+    def chance(m: Any, node: Any, belief: PositionBelief, c: Any) -> float:
+        """Probability that a node has something to report of a target that is believed to be there."""
+        x, y, xx, xy, yy = belief
         return mean_probability(c.detection, c.measurement, x - node.x, y - node.y, xx, xy, yy)
 
     @staticmethod
@@ -247,24 +269,14 @@ class Measurement(Kind):
         return 1.0
 
     @staticmethod
-    def weigh_period(
-        m: Any,
-        x: np.ndarray,
-        log_weights: np.ndarray,
-        belief: Any,
-        network: Any,
-        reports: Any,
-        b: int,
-        c: Any,
-        maps: np.ndarray,
-        scratch: Any,
-    ) -> None:
-        """Weigh the particles with all that row b's head has heard in a period.
+    def weigh_period(m: Any, head: AtHead, c: Any, maps: np.ndarray, scratch: Any) -> None:
+        """Weigh the particles with all that a head has heard in a period, in place.
 
         Args:
-            x, log_weights: (4, P), (P,) float32, changed in place.
             maps, scratch: (S, nx, ny) dB and (P,) float32, for kinds that want them.
         """
+        belief, network, reports, b = head
+        x, log_weights = belief.particles[b], belief.log_weights[b]
         count, positions = reports.count[b], network.positions[b]
         for j in range(count):
             node, value = node_at(positions, reports.node[b, j]), reports.value[b, j]
@@ -274,14 +286,16 @@ class Measurement(Kind):
                 weigh(m, x[0], x[2], log_weights, node, value)
 
     @staticmethod
-    def foretell(m: Any, belief: Any, positions: np.ndarray, b: int, c: Any, maps: np.ndarray, scratch: Any) -> None:
+    def predict_reports(
+        m: Any, belief: Any, positions: np.ndarray, b: int, c: Any, maps: np.ndarray, scratch: Any
+    ) -> None:
         """Note what each node should report in the period to come; only kinds that learn their errors do."""
 
 
 @lean_piece
 def node_at(positions: np.ndarray, number: int) -> Any:
     """A node of a row's positions (S, 2) [m], of whose errors nothing has been learnt."""
-    return Node(positions[number, 0], positions[number, 1], Line(0.0, 0.0, 0.0, 0.0))
+    return Node(np.int64(number), positions[number, 0], positions[number, 1], Line(0.0, 0.0, 0.0, 0.0))
 
 
 @lean_piece
@@ -291,11 +305,17 @@ def node_of(sensors: Sensors, number: int) -> Any:
     if len(sensors.receivers) > 0:
         own = sensors.receivers[number]
         learnt = Line(0.0, own.gradient[0], own.gradient[1], own.variance)
-    return Node(positions[number, 0], positions[number, 1], learnt)
+    return Node(np.int64(number), positions[number, 0], positions[number, 1], learnt)
+
+
+@lean_piece
+def at_point(x: float, y: float) -> PositionBelief:
+    """A target that is known to be at (x, y)."""
+    return PositionBelief(x, y, 0.0, 0.0, 0.0)
 
 
 @by_kind
-def sample(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> Any:
+def sample(m: Any, stream: Any, node: Any, x: float, y: float) -> Any:
     """What a node measures of a target at (x, y), if it detects it: the two numbers of its value."""
 
 
@@ -305,8 +325,8 @@ def log_likelihood(m: Any, value: Any, second: Any, node: Any, x: float, y: floa
 
 
 @by_kind
-def linearise(m: Any, node: Any, x: float, y: float, xx: float, xy: float, yy: float) -> Any:
-    """A `Line` for each number of the value, about a target believed to be at (x, y) with covariance (xx, xy, yy)."""
+def linearise(m: Any, node: Any, belief: PositionBelief) -> Any:
+    """A `Line` for each number of the value, about a target that is believed to be there."""
 
 
 @by_kind
@@ -330,4 +350,4 @@ log_miss: Any = by_kind(Measurement.log_miss)
 chance: Any = by_kind(Measurement.chance)
 packets_a_report: Any = by_kind(Measurement.packets_a_report)
 weigh_period: Any = by_kind(Measurement.weigh_period)
-foretell: Any = by_kind(Measurement.foretell)
+predict_reports: Any = by_kind(Measurement.predict_reports)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from wsn_env.compiled.elementary import log
-from wsn_env.models.measurement.base import Line, Measurement
-from wsn_env.models.measurement.beacon_levels import foretell_levels, weigh_levels
+from wsn_env.models.measurement.base import AtHead, Line, Measurement, Memory, Occasion, PositionBelief
+from wsn_env.models.measurement.beacon_levels import predict_levels, weigh_levels
 from wsn_env.models.measurement.beacon_packets import Packets
 from wsn_env.models.quantity import ScenarioError, quantity
 from wsn_env.models.recordings.replay import load_map
@@ -183,35 +183,26 @@ class Beacon(Measurement):
         )
 
     @staticmethod
-    def sample(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> tuple[float, float]:
+    def sample(m: Any, stream: Any, node: Any, x: float, y: float) -> tuple[float, float]:
         """An episode's packets are drawn at its start, see `Packets`; `news` finds them."""
         return 0.0, 0.0
 
     @staticmethod
-    def news(
-        m: Any, memory: Any, key: Any, period: int, number: int, node: Any, x: float, y: float, asked: bool, c: Any
-    ) -> tuple[Any, ...]:
+    def news(m: Any, memory: Memory, occasion: Occasion, node: Any, x: float, y: float, c: Any) -> tuple[Any, ...]:
         """A receiver reports the packets that it has heard: their mean level, and how many they are."""
-        level, count = memory.packets[number, 0], memory.packets[number, 1]
+        level, count = memory.packets[node.number, 0], memory.packets[node.number, 1]
         return count > 0.0, np.float64(level), np.float64(count), np.float64(count)
 
     @staticmethod
     def log_miss(
-        m: Any,
-        mean: np.ndarray,
-        cov: np.ndarray,
-        positions: np.ndarray,
-        head: int,
-        members: np.ndarray,
-        count: int,
-        c: Any,
+        m: Any, mean: np.ndarray, cov: np.ndarray, positions: np.ndarray, head: int, members: np.ndarray, c: Any
     ) -> float:
         """A receiver hears its beacon anywhere."""
-        awake = count + (head >= 0)
+        awake = len(members) + (head >= 0)
         return awake * log(max(1.0 - m.heard, 1e-12))
 
     @staticmethod
-    def chance(m: Any, node: Any, x: float, y: float, xx: float, xy: float, yy: float, c: Any) -> float:
+    def chance(m: Any, node: Any, belief: PositionBelief, c: Any) -> float:
         """That of hearing any packet."""
         return m.heard
 
@@ -221,7 +212,7 @@ class Beacon(Measurement):
         return m.report_packets
 
     @staticmethod
-    def linearise(m: Any, node: Any, x: float, y: float, xx: float, xy: float, yy: float) -> tuple[Any, ...]:
+    def linearise(m: Any, node: Any, belief: PositionBelief) -> tuple[Any, ...]:
         """The tracker has said what to expect."""
         own = node.learnt
         return (Line(own.expected, own.slope_x, own.slope_y, max(own.variance, 1e-12)),)
@@ -231,24 +222,15 @@ class Beacon(Measurement):
         """Levels are weighed together with their biases, in `weigh_period`."""
 
     @staticmethod
-    def weigh_period(
-        m: Any,
-        x: np.ndarray,
-        log_weights: np.ndarray,
-        belief: Any,
-        network: Any,
-        reports: Any,
-        b: int,
-        c: Any,
-        maps: np.ndarray,
-        scratch: Any,
-    ) -> None:
+    def weigh_period(m: Any, head: AtHead, c: Any, maps: np.ndarray, scratch: Any) -> None:
         """The tempered log likelihoods of the reported levels; the biases are corrected by them."""
-        weigh_levels(m, x, log_weights, belief, network, reports, b, maps, scratch)
+        weigh_levels(m, head, maps, scratch)
 
     @staticmethod
-    def foretell(m: Any, belief: Any, positions: np.ndarray, b: int, c: Any, maps: np.ndarray, scratch: Any) -> None:
+    def predict_reports(
+        m: Any, belief: Any, positions: np.ndarray, b: int, c: Any, maps: np.ndarray, scratch: Any
+    ) -> None:
         """What each receiver should report in the period to come, as a line over the predicted positions."""
         t = c.tracking
         way = 0.5 * c.period_s * (1.0 + t.velocity_kept) if t.walks else c.period_s
-        foretell_levels(m, way, belief, positions, b, maps, scratch)
+        predict_levels(m, way, belief, positions, b, maps, scratch)

@@ -32,24 +32,17 @@ SILENT_DB = -95.0
 
 
 @lean_piece
-def weigh_levels(
-    m: Any,
-    x: np.ndarray,
-    log_weights: np.ndarray,
-    belief: Any,
-    network: Any,
-    reports: Any,
-    b: int,
-    maps: np.ndarray,
-    scratch: Any,
-) -> None:
+def weigh_levels(m: Any, head: Any, maps: np.ndarray, scratch: Any) -> None:
     """Add the tempered log likelihoods of the reported levels, and correct the biases by them.
 
     Args:
         m: the beacon's constants.
+        head: AtHead.
         maps: (S, nx, ny) dB to add to the mean level by cells of the hall; (0, 0, 0): nothing.
         scratch: (P,) float32.
     """
+    belief, network, reports, b = head
+    x, log_weights = belief.particles[b], belief.log_weights[b]
     receivers, biases, positions, n = belief.receivers[b], belief.biases[b], network.positions[b], x.shape[1]
     for j in range(len(receivers)):
         kept, fade = m.bias_kept, F(m.bias_kept)
@@ -117,7 +110,7 @@ def draw_biases(biases: np.ndarray, ancestors: np.ndarray, scratch: Any) -> None
 
 
 @piece
-def foretell_levels(
+def predict_levels(
     m: Any, way_s: float, belief: Any, positions: np.ndarray, b: int, maps: np.ndarray, scratch: Any
 ) -> None:
     """What each receiver should report in the period to come, as a line over the predicted positions.

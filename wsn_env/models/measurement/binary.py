@@ -11,7 +11,17 @@ from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import F, exp, exp32, log32, normal_cdf
 from wsn_env.compiled.kernels import lean_piece
 from wsn_env.models.detection.base import detects, stream_of
-from wsn_env.models.measurement.base import Line, Measurement, Order, node_at, tells
+from wsn_env.models.measurement.base import (
+    AtHead,
+    Line,
+    Measurement,
+    Memory,
+    Occasion,
+    Order,
+    PositionBelief,
+    node_at,
+    tells,
+)
 from wsn_env.models.quantity import ScenarioError, quantity
 
 if TYPE_CHECKING:
@@ -73,61 +83,60 @@ class Binary(Measurement):
         )
 
     @staticmethod
-    def sample(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> tuple[float, float]:
+    def sample(m: Any, stream: Any, node: Any, x: float, y: float) -> tuple[float, float]:
         """The bit is in `news`: it hangs on detection, and on what the node sensed before."""
         dx, dy = node.x - x, node.y - y
         return (1.0 if dx * dx + dy * dy <= m.radius_m * m.radius_m else 0.0), 0.0
 
     @staticmethod
-    def tells(m: Any, key: Any, period: int, number: int, node: Any, x: float, y: float, c: Any) -> bool:
+    def tells(m: Any, occasion: Occasion, node: Any, x: float, y: float, c: Any) -> bool:
         """It detects, unless it misreads its one bit."""
-        misread = m.flip > 0.0 and draws.uniform(draws.stream(key, period, draws.MISREADING), number) < m.flip
-        return detects(c.detection, m, stream_of(c.detection, key, period), number, node, x, y) != misread
+        key, period = occasion.key, occasion.period
+        misread = m.flip > 0.0 and draws.uniform(draws.stream(key, period, draws.MISREADING), node.number) < m.flip
+        return detects(c.detection, m, stream_of(c.detection, key, period), node, x, y) != misread
 
     @staticmethod
-    def news(
-        m: Any, memory: Any, key: Any, period: int, number: int, node: Any, x: float, y: float, asked: bool, c: Any
-    ) -> tuple[Any, ...]:
+    def news(m: Any, memory: Memory, occasion: Occasion, node: Any, x: float, y: float, c: Any) -> tuple[Any, ...]:
         """A node compares what it senses with what it sensed last.
 
         In a search everybody is asked, and silence means 0; so it does where every presence is reported.
 
         Returns: the value is the state, and 1 if it has changed.
         """
-        state = tells(m, key, period, number, node, x, y, c)
-        changed = state != (memory.sensed[number] != 0)
-        memory.sensed[number] = state
-        if m.every_presence or asked:
-            memory.bitmap[number] = 0
+        state = tells(m, occasion, node, x, y, c)
+        changed = state != (memory.sensed[node.number] != 0)
+        memory.sensed[node.number] = state
+        if m.every_presence or occasion.asked:
+            memory.bitmap[node.number] = 0
             has_news = state
         else:
-            has_news = changed or (m.refresh > 0 and period % m.refresh == 0)
+            has_news = changed or (m.refresh > 0 and occasion.period % m.refresh == 0)
         return has_news, np.float64(state), np.float64(changed), 1.0
 
     @staticmethod
-    def take_note(m: Any, memory: Any, number: int, value: Any) -> None:
+    def take_note(m: Any, memory: Memory, number: int, value: Any) -> None:
         """The state as last reported."""
         memory.bitmap[number] = value != 0.0
 
     @staticmethod
-    def finds_target(m: Any, memory: Any, reports: Any, head: int, members: np.ndarray, count: int) -> bool:
+    def finds_target(m: Any, memory: Memory, reports: int, head: int, members: np.ndarray) -> bool:
         """States often stay: whether any node that is awake is known to detect."""
         found = head >= 0 and memory.bitmap[head] != 0
-        for k in range(count):
-            found |= memory.bitmap[members[k]] != 0
+        for member in members:
+            found |= memory.bitmap[member] != 0
         return found
 
     @staticmethod
-    def linearise(m: Any, node: Any, x: float, y: float, xx: float, xy: float, yy: float) -> tuple[Any, ...]:
+    def linearise(m: Any, node: Any, belief: PositionBelief) -> tuple[Any, ...]:
         """One bit as a linear measurement along the way to the node: the noise leaves the same expected variance.
 
         A normal x of variance v that is only known to lie on one side of a threshold t sds from its mean keeps, on
         average, v (1 - phi(t)^2 / (Phi(t) Phi(-t))).
         """
-        dx, dy = x - node.x, y - node.y
+        dx, dy = belief.x - node.x, belief.y - node.y
         distance = max(np.sqrt(dx * dx + dy * dy), 1e-9)
         h0, h1 = dx / distance, dy / distance
-        along = max(h0 * h0 * xx + 2.0 * h0 * h1 * xy + h1 * h1 * yy, 1e-12)
+        along = max(h0 * h0 * belief.xx + 2.0 * h0 * h1 * belief.xy + h1 * h1 * belief.yy, 1e-12)
         blurred = along + m.edge_m * m.edge_m
         t = min(abs(m.radius_m - distance) / np.sqrt(blurred), 8.0)
         below = normal_cdf(-t)
@@ -140,23 +149,14 @@ class Binary(Measurement):
         _weigh_state(px, py, log_weights, node, value[0] != 0.0, m.flip, m)
 
     @staticmethod
-    def weigh_period(
-        m: Any,
-        x: np.ndarray,
-        log_weights: np.ndarray,
-        belief: Any,
-        network: Any,
-        reports: Any,
-        b: int,
-        c: Any,
-        maps: np.ndarray,
-        scratch: Any,
-    ) -> None:
+    def weigh_period(m: Any, head: AtHead, c: Any, maps: np.ndarray, scratch: Any) -> None:
         """Add to every particle the log probability of the awake nodes' states as the bitmap has them: a silent node
         tells as much as one that has reported, but that a report of its own may have been lost.
 
         Nodes whose edge is far from every particle tell all of them the same and are left out.
         """
+        belief, network, reports, b = head
+        x, log_weights = belief.particles[b], belief.log_weights[b]
         positions, battery, standing = network.positions[b], network.battery[b], network.row[b]
         nodes, bitmap = reports.node[b, : reports.count[b]], reports.bitmap[b]
         if standing.head < 0:

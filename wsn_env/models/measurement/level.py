@@ -9,7 +9,7 @@ import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import F, log, log32
-from wsn_env.models.measurement.base import Line, Measurement, level, level_slope
+from wsn_env.models.measurement.base import Line, Measurement, PositionBelief, level, level_slope
 
 if TYPE_CHECKING:
     from wsn_env.scenario import Scenario
@@ -94,23 +94,23 @@ class Level(Measurement):
         return -2.0 * m.slope / squared
 
     @staticmethod
-    def sample(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> tuple[float, float]:
-        noise, _ = draws.normal_pair(stream, number)
+    def sample(m: Any, stream: Any, node: Any, x: float, y: float) -> tuple[float, float]:
+        noise, _ = draws.normal_pair(stream, node.number)
         dx, dy = node.x - x, node.y - y
         return level(m, dx * dx + dy * dy) + m.noise * noise, 0.0
 
     @staticmethod
-    def linearise(m: Any, node: Any, x: float, y: float, xx: float, xy: float, yy: float) -> tuple[Any, ...]:
-        dx, dy = x - node.x, y - node.y
+    def linearise(m: Any, node: Any, belief: PositionBelief) -> tuple[Any, ...]:
+        dx, dy = belief.x - node.x, belief.y - node.y
         squared = dx * dx + dy * dy
-        if xx + yy > 0.0:  # smoothed over the belief's own width, which reaches beyond the floor
-            squared = max(squared + 0.5 * (xx + yy), m.floor_m * m.floor_m)
+        if belief.xx + belief.yy > 0.0:  # smoothed over the belief's own width, which reaches beyond the floor
+            squared = max(squared + 0.5 * (belief.xx + belief.yy), m.floor_m * m.floor_m)
         slope = level_slope(m, squared)
         return (Line(level(m, squared), slope * dx, slope * dy, m.noise * m.noise),)
 
     @staticmethod
-    def signal(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> float:
-        noise, _ = draws.normal_pair(stream, number)
+    def signal(m: Any, stream: Any, node: Any, x: float, y: float) -> float:
+        noise, _ = draws.normal_pair(stream, node.number)
         dx, dy = node.x - x, node.y - y
         return level(m, dx * dx + dy * dy) + m.noise * noise
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import F
-from wsn_env.models.measurement.base import Line, Measurement, Order
+from wsn_env.models.measurement.base import Line, Measurement, Order, PositionBelief
 from wsn_env.models.quantity import quantity
 
 
@@ -34,8 +34,8 @@ class Position(Measurement):
         return 1.0 / np.maximum((offset * offset).sum(axis=-1), 1e-6)
 
     @staticmethod
-    def sample(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> tuple[float, float]:
-        e0, e1 = draws.normal_pair(stream, number)
+    def sample(m: Any, stream: Any, node: Any, x: float, y: float) -> tuple[float, float]:
+        e0, e1 = draws.normal_pair(stream, node.number)
         return x + m.noise_m * e0, y + m.noise_m * e1
 
     @staticmethod
@@ -48,11 +48,11 @@ class Position(Measurement):
             log_weights[i] -= half_precision * (dx * dx + dy * dy)
 
     @staticmethod
-    def linearise(m: Any, node: Any, x: float, y: float, xx: float, xy: float, yy: float) -> tuple[Any, ...]:
+    def linearise(m: Any, node: Any, belief: PositionBelief) -> tuple[Any, ...]:
         variance = m.noise_m * m.noise_m
-        return Line(x, 1.0, 0.0, variance), Line(y, 0.0, 1.0, variance)
+        return Line(belief.x, 1.0, 0.0, variance), Line(belief.y, 0.0, 1.0, variance)
 
     @staticmethod
-    def signal(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> float:
+    def signal(m: Any, stream: Any, node: Any, x: float, y: float) -> float:
         dx, dy = node.x - x, node.y - y
         return -(dx * dx + dy * dy)

@@ -10,7 +10,7 @@ import numpy as np
 from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import F, exp, exp32, log, log32
 from wsn_env.compiled.kernels import lean_piece
-from wsn_env.models.measurement.base import Line, Measurement
+from wsn_env.models.measurement.base import Line, Measurement, PositionBelief
 from wsn_env.models.quantity import quantity
 
 if TYPE_CHECKING:
@@ -55,23 +55,23 @@ class RssiPower(Measurement):
         return squared, squared * (2 * self.noise / (self.exponent * powers))
 
     @staticmethod
-    def sample(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> tuple[float, float]:
-        noise, _ = draws.normal_pair(stream, number)
+    def sample(m: Any, stream: Any, node: Any, x: float, y: float) -> tuple[float, float]:
+        noise, _ = draws.normal_pair(stream, node.number)
         dx, dy = node.x - x, node.y - y
         return power(m, dx * dx + dy * dy) + m.noise * noise, 0.0
 
     @staticmethod
-    def signal(m: Any, stream: Any, number: int, node: Any, x: float, y: float) -> float:
-        noise, _ = draws.normal_pair(stream, number)
+    def signal(m: Any, stream: Any, node: Any, x: float, y: float) -> float:
+        noise, _ = draws.normal_pair(stream, node.number)
         dx, dy = node.x - x, node.y - y
         return power(m, dx * dx + dy * dy) + m.noise * noise
 
     @staticmethod
-    def linearise(m: Any, node: Any, x: float, y: float, xx: float, xy: float, yy: float) -> tuple[Any, ...]:
-        dx, dy = x - node.x, y - node.y
+    def linearise(m: Any, node: Any, belief: PositionBelief) -> tuple[Any, ...]:
+        dx, dy = belief.x - node.x, belief.y - node.y
         squared = dx * dx + dy * dy
-        if xx + yy > 0.0:  # smoothed over the belief's own width, which reaches beyond the floor
-            squared = max(squared + 0.5 * (xx + yy), m.floor_m * m.floor_m)
+        if belief.xx + belief.yy > 0.0:  # smoothed over the belief's own width, which reaches beyond the floor
+            squared = max(squared + 0.5 * (belief.xx + belief.yy), m.floor_m * m.floor_m)
         slope = 0.0
         if squared >= max(m.floor_m * m.floor_m, 1e-12):
             slope = -2.0 * m.slope / squared * power(m, squared)
