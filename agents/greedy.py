@@ -83,25 +83,23 @@ def _bargain(start, stop, cs, handle, table, prices, cluster):
             that the period bears.
         cluster: heads (B,) and members (B, K), filled.
     """
-    _bargain_rows(
-        start, stop, cs[0].radio, knowledge_at(handle), table, prices, np.empty(CANDIDATES, np.int32), cluster
-    )
+    known, chosen = knowledge_at(handle), np.empty(CANDIDATES, np.int32)
+    for b in range(start, stop):
+        _bargain_in(b, cs[0].radio, known, table, prices, chosen, cluster)
 
 
 @lean_piece
-def _bargain_rows(start, stop, r, known, table, prices, chosen, cluster):
+def _bargain_in(b, r, known, table, prices, chosen, cluster):
     heads, members = cluster
-    for b in range(start, stop):
-        outlook = outlook_of(known, b, CANDIDATES + 1, table)
-        price, nearest, standing = Price(prices[0][b], prices[1][b]), CANDIDATES, CANDIDATES + 1
-        old = outlook.nodes[standing].node
-        heads[b] = outlook.nodes[nearest].node
-        moved = _gather(nearest, outlook, price, r, members[b])
-        if old >= 0 and old != heads[b]:
-            if _gather(standing, outlook, price, r, chosen) >= moved:
-                heads[b] = old
-                for k in range(CANDIDATES):
-                    members[b, k] = chosen[k]
+    nearest, standing = CANDIDATES, CANDIDATES + 1
+    outlook, price = outlook_of(known, b, standing, table), Price(prices[0][b], prices[1][b])
+    old = outlook.nodes[standing].node
+    heads[b] = outlook.nodes[nearest].node
+    worth = _gather(nearest, outlook, price, r, members[b])
+    if old >= 0 and old != heads[b] and _gather(standing, outlook, price, r, chosen) >= worth:
+        heads[b] = old
+        for k in range(CANDIDATES):
+            members[b, k] = chosen[k]
 
 
 class Price(NamedTuple):

@@ -87,35 +87,34 @@ def _read_menu(start, stop, cs, handle, choices, found, cluster):
 
     Returns: how many choices are not in the menu.
     """
-    ranking = np.empty(found[0], RANKED)
-    return _read_rows(start, stop, cs[0], knowledge_at(handle), choices, found, ranking, cluster)
+    known, ranking, strange = knowledge_at(handle), np.empty(found[0], RANKED), 0
+    for b in range(start, stop):
+        strange += not 0 <= choices[1][b] < MENU_ENTRIES
+        _read_entry(b, cs[0], known, choices, found, ranking, cluster)
+    return strange
 
 
 @lean_piece
-def _read_rows(start, stop, c, known, choices, found, ranking, cluster):
+def _read_entry(b, c, known, choices, found, ranking, cluster):
     (by, entries), (candidates, table), (heads, members) = choices, found, cluster
-    strange = 0
-    for b in range(start, stop):
-        entry = entries[b]
-        strange += entry < 0 or entry >= MENU_ENTRIES
-        members[b] = -1
-        if entry == 0 and known.network.row[b].head >= 0:
-            heads[b] = KEEP_CLUSTER
-            continue
-        rule, further = (entry - 1) // GROUP, (entry - 1) % GROUP
-        if entry <= 0:
-            rule, further = KEEP, 0
-        outlook = outlook_of(known, b, candidates, table)
-        leader = rank_row(by, rule, outlook, c, ranking)
-        heads[b] = outlook.nodes[leader].node if leader >= 0 else -1
-        slot = 0
-        for k in range(len(ranking)):
-            place = ranking[k].place
-            if further > 0 and place >= 0 and outlook.nodes[place].node != heads[b]:
-                members[b, slot] = outlook.nodes[place].node
-                slot += 1
-                further -= 1
-    return strange
+    entry = entries[b]
+    members[b] = -1
+    if entry == 0 and known.network.row[b].head >= 0:
+        heads[b] = KEEP_CLUSTER
+        return
+    rule, further = (entry - 1) // GROUP, (entry - 1) % GROUP
+    if entry <= 0:
+        rule, further = KEEP, 0
+    outlook = outlook_of(known, b, candidates, table)
+    leader = rank_row(by, rule, outlook, c, ranking)
+    heads[b] = outlook.nodes[leader].node if leader >= 0 else -1
+    slot = 0
+    for k in range(len(ranking)):
+        place = ranking[k].place
+        if further > 0 and place >= 0 and outlook.nodes[place].node != heads[b]:
+            members[b, slot] = outlook.nodes[place].node
+            slot += 1
+            further -= 1
 
 
 class SubsetAction:

@@ -228,16 +228,17 @@ def order_by_information(
         found: nodes and table of an Expected to the depth REPORTS.
         ordered: (B, M) filled with the first M nodes, -1 at the end.
     """
-    _order_rows(start, stop, cs[0], knowledge_at(handle), keeps, found, np.empty(ordered.shape[1], RANKED), ordered)
+    known, ranking = knowledge_at(handle), np.empty(ordered.shape[1], RANKED)
+    for b in range(start, stop):
+        _order_by_information(b, cs[0], known, keeps, found, ranking, ordered)
 
 
 @lean_piece
-def _order_rows(start, stop, c, known, keeps, found, ranking, ordered):
+def _order_by_information(b, c, known, keeps, found, ranking, ordered):
     nodes, table = found
     candidates = nodes.shape[1]
-    for b in range(start, stop):
-        outlook = outlook_of(known, b, candidates, table)
-        order_row(outlook, candidates if keeps[b] else -1, 0.0, c, ranking)
-        for slot in range(len(ranking)):
-            place = ranking[slot].place
-            ordered[b, slot] = nodes[b, place] if place >= 0 else -1
+    outlook = outlook_of(known, b, candidates, table)
+    order_row(outlook, candidates if keeps[b] else -1, 0.0, c, ranking)
+    for slot in range(len(ranking)):
+        place = ranking[slot].place
+        ordered[b, slot] = nodes[b, place] if place >= 0 else -1

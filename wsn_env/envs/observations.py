@@ -57,29 +57,29 @@ def _encode_candidates(start, stop, cs, handle, battery_j, found, out):
         handle: of what the network knows (Knowledge).
         found: rows (B,) bool; how many candidates; the table of Expected to the depth REPORTS.
     """
-    ranking = np.empty(found[1], RANKED)
-    _encode_candidate_rows(start, stop, cs[0], knowledge_at(handle), battery_j, found, ranking, out)
+    known, ranking = knowledge_at(handle), np.empty(found[1], RANKED)
+    for b in range(start, stop):
+        if found[0][b]:
+            _encode_candidates_of(b, cs[0], known, battery_j, found, ranking, out)
 
 
 @lean_piece
-def _encode_candidate_rows(start, stop, c, known, battery_j, found, ranking, out):
-    rows, candidates, table = found
-    for b in range(start, stop):
-        if rows[b]:
-            f, outlook = out[b], outlook_of(known, b, candidates, table)
-            heading = describe_belief(outlook, known.row[b], known.reports.count[b], c.radius_m, f[:G])
-            f[G:] = 0.0
-            for k in range(candidates):
-                node, g = outlook.nodes[k].node, f[G + k * features.WIDTH : G + (k + 1) * features.WIDTH]
-                if node < 0:
-                    g[2] = BOUND
-                else:
-                    describe_candidate(outlook, k, heading, c.radius_m, g)
-                    g[7] = known.network.battery[b, node] / battery_j
-            standing = outlook.nodes[candidates].node >= 0
-            order_row(outlook, candidates if standing else -1, 0.0, c, ranking)
-            describe_merit(outlook, ranking, f[G:])
-            clip(f)
+def _encode_candidates_of(b, c, known, battery_j, found, ranking, out):
+    _, candidates, table = found
+    f, outlook = out[b], outlook_of(known, b, candidates, table)
+    heading = describe_belief(outlook, known.row[b], known.reports.count[b], c.radius_m, f[:G])
+    f[G:] = 0.0
+    for k in range(candidates):
+        node, g = outlook.nodes[k].node, f[G + k * features.WIDTH : G + (k + 1) * features.WIDTH]
+        if node < 0:
+            g[2] = BOUND
+        else:
+            describe_candidate(outlook, k, heading, c.radius_m, g)
+            g[7] = known.network.battery[b, node] / battery_j
+    standing = outlook.nodes[candidates].node >= 0
+    order_row(outlook, candidates if standing else -1, 0.0, c, ranking)
+    describe_merit(outlook, ranking, f[G:])
+    clip(f)
 
 
 @kernel
@@ -91,26 +91,25 @@ def _encode_menu(start, stop, cs, handle, terms, found, out):
         found: as for `_encode_candidates`, to the depth REPORTS_AHEAD.
         The rest: as `_encode_candidates`.
     """
-    ranking = np.empty(found[1], RANKED)
-    _encode_menu_rows(start, stop, cs[0], knowledge_at(handle), terms, found, ranking, out)
+    known, ranking = knowledge_at(handle), np.empty(found[1], RANKED)
+    for b in range(start, stop):
+        if found[0][b]:
+            _encode_menu_of(b, cs[0], known, terms, found, ranking, out)
 
 
 @lean_piece
-def _encode_menu_rows(start, stop, c, known, terms, found, ranking, out):
-    typical_mj, by, costs = terms
-    rows, candidates, table = found
+def _encode_menu_of(b, c, known, terms, found, ranking, out):
+    (typical_mj, by, costs), (_, candidates, table) = terms, found
     group = GROUP * prospects.WIDTH
-    for b in range(start, stop):
-        if rows[b]:
-            f, outlook, units = out[b], outlook_of(known, b, candidates, table), Units(costs[b], typical_mj)
-            heading = describe_belief(outlook, known.row[b], known.reports.count[b], c.radius_m, f[:G])
-            first = G + prospects.WIDTH
-            describe_standing(outlook, heading, units, c, f[G:first])
-            for rule in range(3):
-                leader = rank_row(by, rule, outlook, c, ranking)
-                entries = f[first + rule * group : first + (rule + 1) * group]
-                describe_entries(outlook, ranking, leader, heading, units, c, entries)
-            clip(f)
+    f, outlook, units = out[b], outlook_of(known, b, candidates, table), Units(costs[b], typical_mj)
+    heading = describe_belief(outlook, known.row[b], known.reports.count[b], c.radius_m, f[:G])
+    first = G + prospects.WIDTH
+    describe_standing(outlook, heading, units, c, f[G:first])
+    for rule in range(3):
+        leader = rank_row(by, rule, outlook, c, ranking)
+        entries = f[first + rule * group : first + (rule + 1) * group]
+        describe_entries(outlook, ranking, leader, heading, units, c, entries)
+    clip(f)
 
 
 class CandidatesObservation:
