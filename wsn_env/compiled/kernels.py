@@ -47,7 +47,9 @@ def _options(**wanted: Any) -> dict[str, Any]:
     return {"nopython": True, "error_model": "numpy", "nogil": True, "fastmath": False} | known
 
 
-_COUNTING, _LEAN = _options(_nrt=True), _options(_nrt=False)
+COUNTING: dict[str, Any]
+LEAN: dict[str, Any]
+COUNTING, LEAN = _options(_nrt=True), _options(_nrt=False)
 
 
 def _compile(function: F, options: dict[str, Any]) -> F:
@@ -56,17 +58,17 @@ def _compile(function: F, options: dict[str, Any]) -> F:
 
 def piece(function: F) -> F:
     """Compile a function for kernels to call."""
-    return _compile(function, _COUNTING)
+    return _compile(function, COUNTING)
 
 
 def inline_piece(function: F) -> F:
     """A piece that is copied into whoever calls it: for long loops."""
-    return _compile(function, _COUNTING | _options(forceinline=True))
+    return _compile(function, COUNTING | _options(forceinline=True))
 
 
 def lean_piece(function: F) -> F:
     """A piece that allocates nothing."""
-    return _compile(function, _LEAN)
+    return _compile(function, LEAN)
 
 
 class Kernel:
@@ -142,12 +144,12 @@ class Pinned:
 
 def kernel(function: Any) -> Kernel:
     """Compile a function for Python to call, cached on disk."""
-    return Kernel(function, _COUNTING)
+    return Kernel(function, COUNTING)
 
 
 def lean_kernel(function: Any) -> Kernel:
     """A kernel of lean pieces only."""
-    return Kernel(function, _LEAN)
+    return Kernel(function, LEAN)
 
 
 @functools.cache

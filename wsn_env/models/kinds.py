@@ -8,10 +8,9 @@ found again on disk while their code is the same, and never runs with a kind tha
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -22,7 +21,7 @@ from numba.core.errors import TypingError
 from numba.extending import overload
 
 from wsn_env.compiled.arrays import record
-from wsn_env.compiled.kernels import fast, lean_piece, piece
+from wsn_env.compiled.kernels import COUNTING, FAST, LEAN, fast, lean_piece
 from wsn_env.compiled.stamp import plain_function, stamp
 from wsn_env.models.quantity import ScenarioError, Section
 
@@ -100,59 +99,58 @@ def by_kind(function: Callable[..., Any]) -> Any:
     """What kernels call for a role's function: that of the kind whose constants are the first argument.
 
     Args:
-        function: of the role, for its name and arguments.
+        function: of the role, for its name.
     """
-    dispatching = _dispatcher(function, _strict, function.__name__)
-    dispatching.fast_twin = _dispatcher(function, _fast, f"{function.__name__}_fast")
+    dispatching = _dispatcher(function, False)
+    dispatching.fast_twin = _dispatcher(function, True)
     return dispatching
 
 
-def _dispatcher(function: Callable, compiled: Callable, own_name: str) -> Any:
-    name, arguments = function.__name__, ", ".join(inspect.signature(function).parameters)
+def _dispatcher(function: Callable, quick: bool) -> Any:
+    name = function.__name__
 
-    def choose(constants):
-        if not isinstance(constants, types.Record):
-            raise TypingError(f"{name}: takes a kind's constants first, not {constants}")
-        return compiled(*_function_of(next(iter(constants.fields)), name))
+    def dispatching(constants, *arguments):  # in plain Python
+        return getattr(_kind_of(constants.dtype.names[0], name), name)(constants, *arguments)
 
-    def find(constants):
-        return _function_of(constants.dtype.names[0], name)[0]
-
-    first = arguments.partition(",")[0]
-    source = (
-        f"def {name}({arguments}):\n    return find({first})({arguments})\n"
-        f"def typing({arguments}):\n    chosen = choose({first})\n    return lambda {arguments}: chosen({arguments})\n"
-    )
-    made: dict[str, Any] = {"find": find, "choose": choose}
-    exec(source, made)  # noqa: S102  Numba wants the arguments under their own names
-    dispatching = made[name]
-    dispatching.__module__, dispatching.__qualname__ = function.__module__, f"by_kind.{own_name}"
-    dispatching.__doc__ = function.__doc__
-    overload(dispatching, jit_options={"error_model": "numpy", "nogil": True, "fastmath": False})(made["typing"])
+    dispatching.__module__, dispatching.__doc__ = function.__module__, function.__doc__
+    dispatching.__qualname__ = f"by_kind.{name}{'_fast' if quick else ''}"
+    for allocates, options in ((True, COUNTING), (False, LEAN)):
+        chosen = partial(_implementation, name, allocates, quick)
+        more = {"fastmath": FAST} if quick else {}
+        overload(dispatching, jit_options=options | more, strict=False)(_typing(chosen))
     return dispatching
 
 
-def _function_of(mark: str, name: str) -> tuple[Callable, bool]:
-    """A kind's function, and whether it may allocate."""
+def _typing(choose: Callable[[Any], Any]) -> Callable[..., Any]:
+    def typing(constants, *arguments):
+        return choose(constants)
+
+    return typing
+
+
+def _implementation(name: str, allocates: bool, quick: bool, constants: Any) -> Any:
+    """A kind's function, if it may allocate as said; else None."""
+    if not isinstance(constants, types.Record):
+        raise TypingError(f"{name}: takes a kind's constants first, not {constants}")
+    kind = _kind_of(next(iter(constants.fields)), name)
+    if kind.allocates != allocates:
+        return None
+    own = plain_function(getattr(kind, name))
+    return _quick(own) if quick else own
+
+
+def _kind_of(mark: str, name: str) -> type[Kind]:
     kind = _marked.get(mark)
     if kind is None:
         raise TypingError(f"{name}: {mark} marks no kind")
-    function = getattr(kind, name, None)
-    if function is None:
+    if getattr(kind, name, None) is None:
         raise TypingError(f"{kind.__name__} has no {name}(...)")
-    return function, kind.allocates
+    return kind
 
 
 @cache
-def _strict(function: Callable, allocates: bool) -> Any:
-    if hasattr(function, "py_func"):
-        return function
-    return piece(function) if allocates else lean_piece(function)
-
-
-@cache
-def _fast(function: Callable, allocates: bool) -> Any:
-    return fast(_strict(function, allocates))
+def _quick(function: Any) -> Any:
+    return fast(lean_piece(function)).py_func
 
 
 class Registry:
