@@ -53,10 +53,10 @@ class Canvas:
             colour: (3,).
             opacity: a number, or (N,) of each.
         """
-        starts = _points(starts)
+        starts, ends = _points(starts), _points(ends)
         widths, opacities = (np.full(len(starts), value, np.float64) for value in (width, opacity))
-        ends = _points(ends)
-        strokes.draw_lines(self.image, self._most, self.clip, starts, ends, widths, opacities, _numbers(colour))
+        lines = starts, ends, widths, opacities
+        strokes.draw_lines(self.image, self._most, self.clip, lines, _numbers(colour))
 
     def cloud(self, x: np.ndarray, y: np.ndarray, weights: Any, colour: str) -> None:
         """Points (P,); where they are many, or their weights large, the colour is deeper."""
