@@ -10,26 +10,22 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections import deque
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 import torch
 import tyro
 from stable_baselines3 import PPO
-from stable_baselines3.common.base_class import BaseAlgorithm
-from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecMonitor
 
 from wsn_env.agents.ppo import PPOPolicy, save_policy
 from wsn_env.cli import make_scenario
-from wsn_env.envs.features import BELIEF_FEATURES, CANDIDATE_FEATURES
 from wsn_env.envs.interface import Settings
-from wsn_env.envs.prospects import ENTRY_FEATURES
+from wsn_env.envs.observations import ObservationName
 from wsn_env.envs.vector_env import ClusterVectorEnv
 from wsn_env.evaluation.comparison import evaluate
 from wsn_env.evaluation.files import replacing
@@ -38,13 +34,15 @@ from wsn_env.evaluation.policies import Policy, make_policy, policy_names
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.evaluation.rollout import FIRST_SEED, evaluation_seeds
 from wsn_env.evaluation.versions import versions
-from wsn_env.learning.actor_critic import EntryPolicy, network_of
+from wsn_env.learning.actor_critic import EntryPolicy, entry_sizes, network_of
+from wsn_env.learning.checkpoints import CHECKPOINT, Watch, load_checkpoint, save_checkpoint
 from wsn_env.learning.concat_vector_env import ConcatVectorEnv
 from wsn_env.learning.defaults import default_level, default_node_counts, default_order
 from wsn_env.learning.levelling import LevelledRollout
 from wsn_env.learning.network import Network
 from wsn_env.learning.sb3 import SB3VecEnv
 from wsn_env.learning.training_reward import TrainingReward
+from wsn_env.models.measurement.base import Order
 from wsn_env.models.quantity import check_quantity, parse_overrides
 from wsn_env.reports.pages.evaluation_page import write_report
 from wsn_env.reports.pictures import write_picture
@@ -74,11 +72,11 @@ class Training:
     vary: list[str] | None = None
     """Further scenarios to train in, each this one with some quantities changed: nodes=81 motion=turns,particles=1000.
     The rows are dealt evenly among all. Left out: fewer and twice as many nodes, where they are drawn."""
-    action: str = "menu"
-    """What it chooses from: menu | subset."""
-    order: str | None = None
-    """The menu's order of merit: nearest | information | value; left out: by what the nodes measure."""
-    reward: str = "belief"
+    action: Literal["menu", "subset"] = "menu"
+    """What it chooses from."""
+    order: Order | None = None
+    """The menu's order of merit; left out: by what the nodes measure."""
+    reward: Literal["belief", "error"] = "belief"
     """Training reward: belief (what the filter expects, low variance) | error (the true error)."""
 
     # where it goes
@@ -119,7 +117,7 @@ class Training:
     what the nodes measure."""
     entropy: float = 5e-4
     """Weight of the entropy bonus."""
-    network: str = "entries"
+    network: Literal["entries", "flat"] = "entries"
     """entries: the same small network scores every entry of the choice, whatever their number; flat: one network of
     the whole observation."""
     units: tuple[int, int] = (32, 32)
@@ -167,8 +165,9 @@ def train(settings: Training) -> None:
     check(settings)
     rules = opponents(scenario) if settings.episodes else {}
     torch.set_num_threads(settings.torch_threads)
-    spoken: dict[str, Any] = dict(action=settings.action, reward=settings.reward, order=settings.order)
-    speaks = Settings(observation="menu" if settings.action == "menu" else "candidates", **spoken)
+    observation: ObservationName = "menu" if settings.action == "menu" else "candidates"
+    order = settings.order or default_order(scenario)
+    speaks = Settings(settings.action, observation, settings.reward, order)
     folder = open_folder(settings)
     learn = learn_on_ray if settings.engine == "ray" else learn_here
     network = learn(settings, scenario, speaks, folder)
@@ -212,7 +211,7 @@ def learn_here(settings: Training, scenario: Scenario, speaks: Settings, folder:
         started, busy = time.perf_counter(), time.process_time()
         model.set_logger(configure(str(folder / f"progress-{model.num_timesteps}"), ["tensorboard", "csv"]))
         with progress_bar() as report:
-            callback = Watch(settings, folder, report)
+            callback = Watch(folder, settings.steps, settings.checkpoint_steps, report)
             try:
                 model.learn(left, callback=callback, reset_num_timesteps=False)
             finally:
@@ -236,7 +235,7 @@ def learn_on_ray(settings: Training, scenario: Scenario, speaks: Settings, folde
     whole = make_envs(settings, scenario, speaks, len(settings.vary or ()) + 1)
     training = RayTraining(
         lambda rows: make_envs(settings, scenario, speaks, rows),
-        entries(settings, whole.single_observation_space),
+        entry_sizes(settings.action, whole.single_observation_space, settings.units, settings.critic),
         folder / "ray",
         rows=settings.rows,
         runners=settings.runners,
@@ -279,9 +278,10 @@ def check(settings: Training) -> None:
     for name in ("units", "critic"):
         for units in getattr(settings, name):
             check_quantity("train.py", name, units, at_least=1, whole=True)
-    for name, allowed in (("network", ("entries", "flat")), ("action", ("menu", "subset"))):
-        if getattr(settings, name) not in allowed:
-            raise ValueError(f"train.py: {name} = {getattr(settings, name)!r}: must be one of {', '.join(allowed)}")
+    for name, hint in get_type_hints(Training).items():
+        if get_origin(hint) is Literal and getattr(settings, name) not in get_args(hint):
+            allowed = ", ".join(get_args(hint))
+            raise ValueError(f"train.py: {name} = {getattr(settings, name)!r}: must be one of {allowed}")
     check_quantity("train.py", "runners", settings.runners, at_least=0, whole=True)
     shares = 1 if settings.engine == "local" else max(1, settings.runners)
     others = len(settings.vary or ())
@@ -303,7 +303,7 @@ def open_folder(settings: Training) -> Path:
     """The run's folder with config.json; an existing run is only touched by --resume, with the same settings."""
     folder = settings.folder
     path = folder / "config.json"
-    begun = any((folder / name).exists() for name in ("checkpoint.zip", "ray", "policy.json"))
+    begun = any((folder / name).exists() for name in (CHECKPOINT, "ray", "policy.json"))
     if path.exists() and begun:
         if not settings.resume:
             raise ValueError(f"{folder} exists: --resume continues it, --name begins another, or remove it")
@@ -326,14 +326,9 @@ def plain(settings: Training) -> dict:
 
 def make_model(settings: Training, envs, folder: Path) -> PPO:
     """A new model, or the one of the last checkpoint."""
-    path = folder / "checkpoint.zip"
-    if path.exists():
-        try:
-            model = PPO.load(path, env=envs)
-        except Exception as problem:  # zipfile, pickle and torch raise all kinds for a damaged file
-            raise ValueError(f"{path} is cut short or no checkpoint: remove it to begin anew ({problem!r})") from None
-        envs.seed(settings.seed + model.num_timesteps)  # other episodes than before
-        return model
+    begun = load_checkpoint(folder, envs, settings.seed)
+    if begun is not None:
+        return begun
     kind, shape = architecture(settings, envs)
     return PPO(
         kind,
@@ -358,59 +353,8 @@ def architecture(settings: Training, envs) -> tuple:
     """The kind of PPO's policy, and its arguments."""
     if settings.network == "flat":
         return "MlpPolicy", {"net_arch": {"pi": list(settings.units), "vf": list(settings.critic)}}
-    return EntryPolicy, {"entries": entries(settings, envs.observation_space)}
-
-
-def entries(settings: Training, space) -> dict:
-    """Arguments of EntryActorCritic."""
-    menu = settings.action == "menu"
-    return dict(
-        belief=len(BELIEF_FEATURES),
-        entry=len(ENTRY_FEATURES if menu else CANDIDATE_FEATURES),
-        observation=space.shape[0],
-        outputs=1 if menu else 2,
-        actor=settings.units,
-        critic=settings.critic,
-    )
-
-
-def save_checkpoint(model: BaseAlgorithm, folder: Path) -> None:
-    """Whole or not at all."""
-    with replacing(folder / "checkpoint.zip") as path, open(path, "wb") as file:
-        model.save(file)
-
-
-class Watch(BaseCallback):
-    """Progress bar and checkpoints."""
-
-    def __init__(self, settings: Training, folder: Path, report):
-        super().__init__()
-        self._settings, self._folder, self._report = settings, folder, report
-        self._saved = 0
-        self._rms: deque[float] = deque(maxlen=200)  # episodes
-
-    def _on_step(self) -> bool:
-        self._rms.extend(info["episode_rms_m"] for info in self.locals["infos"] if "episode_rms_m" in info)
-        return True
-
-    def _on_rollout_end(self) -> None:
-        rms, error = mean_and_error(self._rms)
-        self.logger.record("rollout/episode_rms_m", rms)
-        self.logger.record("rollout/episode_rms_se_m", error)
-        self.logger.record(
-            "rollout/ep_rew_se", mean_and_error([info["r"] for info in self.model.ep_info_buffer or ()])[1]
-        )
-        self._report(min(self.num_timesteps, self._settings.steps), self._settings.steps, f"training, RMS {rms:.2f} m")
-        if self.num_timesteps - self._saved >= self._settings.checkpoint_steps:
-            save_checkpoint(self.model, self._folder)
-            self._saved = self.num_timesteps
-
-
-def mean_and_error(values) -> tuple[float, float]:
-    """Of some numbers their mean and its standard error; NaN where there are too few."""
-    values = np.array(values, dtype=float)
-    mean = float(values.mean()) if len(values) else float("nan")
-    return mean, float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else float("nan")
+    entries = entry_sizes(settings.action, envs.observation_space, settings.units, settings.critic)
+    return EntryPolicy, {"entries": entries}
 
 
 def opponents(scenario: Scenario) -> dict[str, Policy]:

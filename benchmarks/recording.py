@@ -15,7 +15,8 @@ from rich.console import Console
 
 from benchmarks.race import Claim, Options, Result, Table, figure, interleave, main
 from wsn_env.bluetooth.synthetic import write_dataset
-from wsn_env.models.recordings.dataset import read_receivers, read_track, track_files
+from wsn_env.models.recordings.dataset import read_track, track_files
+from wsn_env.models.recordings.receivers import read_receivers
 
 SECONDS, SHORT_SECONDS = 256, 30  # of a track; the first makes 600 kB
 AT_MOST_S = 1.0

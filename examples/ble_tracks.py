@@ -15,7 +15,8 @@ from pathlib import Path
 
 import tyro
 
-from wsn_env.models.recordings.dataset import DatasetError, Track, read_dataset
+from wsn_env.models.recordings.dataset import Track, read_dataset
+from wsn_env.models.recordings.receivers import DatasetError
 
 
 @dataclass

@@ -23,14 +23,12 @@ from wsn_env.models.recordings.dataset import (
     ASTRAY_S,
     GAP_S,
     REASONS,
-    DatasetError,
-    Receivers,
     Track,
     read_dataset,
-    read_receivers,
     read_track,
     track_files,
 )
+from wsn_env.models.recordings.receivers import DatasetError, Receivers, read_receivers
 
 FOLDER = os.environ.get("WSN_BLE_DIR")
 ROOT = Path(__file__).parents[1]

@@ -17,7 +17,8 @@ from wsn_env.bluetooth.residual_map import CELL_M, residual_map, save_map
 from wsn_env.cli import Calibrate, run_calibrate
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.models.recordings import dataset
-from wsn_env.models.recordings.dataset import Receivers, Track, read_dataset
+from wsn_env.models.recordings.dataset import Track, read_dataset
+from wsn_env.models.recordings.receivers import Receivers
 from wsn_env.models.recordings.replay import load_map
 from wsn_env.reports import calibration_tables
 from wsn_env.reports.calibration_tables import CALIBRATION_FILES

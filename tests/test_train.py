@@ -175,6 +175,8 @@ def test_advantages_are_levelled_as_asked_for_or_where_nodes_measure_positions(a
         dict(episodes=-1),
         dict(units=(0, 8)),
         dict(network="deep"),
+        dict(action="subsets"),
+        dict(engine="rays"),
         dict(engine="ray", network="flat"),
         dict(address="auto"),
         dict(runners=-1),

@@ -22,7 +22,8 @@ from wsn_env.bluetooth.losses import measure_losses
 from wsn_env.bluetooth.packets import Packets, concatenate_tracks
 
 if TYPE_CHECKING:
-    from wsn_env.models.recordings.dataset import Receivers, Track
+    from wsn_env.models.recordings.dataset import Track
+    from wsn_env.models.recordings.receivers import Receivers
 
 EXPONENT_SD = 0.3  # of a receiver's exponent about the common one, before the receiver is heard
 EXPONENT_NOISE_DB = 5.3 * sqrt(8)  # sd of a level for this purpose: eight neighbouring packets tell as much as one

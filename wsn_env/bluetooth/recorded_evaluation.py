@@ -24,7 +24,8 @@ from wsn_env.evaluation.rollout import Engine
 from wsn_env.evaluation.versions import versions
 from wsn_env.models.measurement.beacon import Beacon
 from wsn_env.models.quantity import ScenarioError
-from wsn_env.models.recordings.dataset import DatasetError, read_dataset, track_files, track_name
+from wsn_env.models.recordings.dataset import read_dataset, track_files, track_name
+from wsn_env.models.recordings.receivers import DatasetError
 from wsn_env.scenario import Scenario
 
 

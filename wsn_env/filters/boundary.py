@@ -20,7 +20,7 @@ Differs from the paper: eqs. 12 and 13 as printed leave out F P F', and then the
 x(k+1) for x(k); the last row of eq. 6 lacks its minus signs.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,6 +41,40 @@ UNKNOWN = 1e4  # m^2 and m^2/s^2: P0 of recursive least squares
 RANGES_P0 = (100.0, 200.0, 100.0, 200.0)  # m^2, m^2/s^2
 PASSES = 2  # linearisations of the ranges
 GATE_SDS = 3.0
+
+
+class Nodes(NamedTuple):
+    """A row's nodes and what they last said."""
+
+    positions: np.ndarray  # (S, 2) m
+    battery: np.ndarray  # (S,) J
+    standing: Any  # NETWORK: head and number of members
+    members: np.ndarray  # (S,) the first of them
+    bitmap: np.ndarray  # (S,) states as last reported
+
+
+class Circle(NamedTuple):
+    """The gate: where the boundary nodes' circle is expected."""
+
+    x: float  # m, its centre
+    y: float
+    tolerance_m: float  # that centre and radius may be off; inf: there is no gate
+
+
+class Boundary(NamedTuple):
+    """A period's boundary nodes."""
+
+    nodes: np.ndarray  # (n,) that stand close enough to the circle
+    reported: int  # how many there were in all
+
+
+class Fix(NamedTuple):
+    """Where the target is by a period's reports alone."""
+
+    x: float  # m
+    y: float
+    spread: tuple[float, float, float]  # m^2, the covariance xx, xy, yy; zeros where it is not told
+    age_s: float  # how long ago that was
 
 
 class BoundaryTracker(MomentTracker):
@@ -75,37 +109,45 @@ class BoundaryTracker(MomentTracker):
         resampled: np.ndarray,
     ) -> None:
         """Correct the prediction with the boundary nodes of the period, in place."""
-        how = self._constants, self._variant, self._at_rest
-        arrays = belief.row, reports.handle, network.handle
-        over_rows(correct_rows, len(keys), self._threads, *how, periods, *arrays)
+        how, handles = (self._variant, self._at_rest), (network.handle, reports.handle)
+        over_rows(correct_rows, len(keys), self._threads, self._constants, how, periods, belief.row, handles)
 
 
 @kernel
 def correct_rows(
-    start: int,
-    stop: int,
-    cs: Any,
-    variant: int,
-    at_rest: bool,
-    periods: np.ndarray,
-    beliefs: np.ndarray,
-    reports_handle: np.ndarray,
-    network_handle: np.ndarray,
+    start: int, stop: int, cs: Any, how: Any, periods: np.ndarray, beliefs: np.ndarray, handles: Any
 ) -> None:
-    """One period of every row."""
-    reports, network = reports_at(reports_handle), network_at(network_handle)
-    nodes = np.empty(network.battery.shape[1], np.int32)
+    """One period of every row.
+
+    Args:
+        how: the variant; whether the target is at rest when an episode starts, somewhere.
+        handles: of network and reports.
+    """
+    network, reports, (variant, at_rest) = network_at(handles[0]), reports_at(handles[1]), how
+    room = np.empty(network.battery.shape[1], np.int32)
     for b in range(start, stop):
-        belief = beliefs[b]
-        take_prediction(belief)
-        gate = expect_circle(belief, network, reports.bitmap[b], b, cs[0])
-        n, told = list_boundary(gate, network.positions[b], reports, nodes, b, cs[0])
-        if variant == RANGES:
-            update_by_ranges(belief, network.positions[b], nodes[:n], cs[0])
-        else:
-            restarts = at_rest and periods[b] == 1
-            bitmap = reports.bitmap[b]
-            update_by_position(belief, network, bitmap, nodes[:n], told, gate, restarts, variant, b, cs[0])
+        correct_row(beliefs[b], network, reports, b, (variant, at_rest and periods[b] == 1), room, cs[0])
+
+
+@lean_piece
+def correct_row(belief: Any, network: Any, reports: Any, b: int, how: Any, room: np.ndarray, c: Any) -> None:
+    """One period of row b.
+
+    Args:
+        how: the variant; whether the filter starts here.
+        room: (S,) int32 for boundary nodes.
+    """
+    variant, starts = how
+    nodes = Nodes(network.positions[b], network.battery[b], network.row[b], network.members[b], reports.bitmap[b])
+    take_prediction(belief)
+    circle = expect_circle(belief, nodes, c)
+    boundary = list_boundary(circle, nodes, reports, b, room, c)
+    if variant == RANGES:
+        update_by_ranges(belief, nodes.positions, boundary.nodes, c)
+        return
+    fix = locate(belief.mean, nodes, boundary, circle, variant, c)
+    if fix.spread[0] != 0.0:
+        update_by_fix(belief, fix, variant, starts)
 
 
 @lean_piece
@@ -125,57 +167,44 @@ def middle(mean: np.ndarray, c: Any) -> tuple[Any, ...]:
 
 
 @lean_piece
-def expect_circle(belief: Any, network: Any, bitmap: np.ndarray, b: int, c: Any) -> tuple[Any, ...]:
-    """The gate: x, y where the circle's centre is expected and how far off it may be [m], for gate_m and three sds.
+def expect_circle(belief: Any, nodes: Nodes, c: Any) -> Circle:
+    """Where the circle is expected, within gate_m and three sds.
 
     By the prediction or by the centroid, whichever is sharper: before a filter has learnt a velocity, the centroid.
     """
     if c.tracking.gate_m == np.inf:
-        return 0.0, 0.0, np.inf
+        return Circle(0.0, 0.0, np.inf)
     x, y = middle(belief.predicted_mean, c)
     variance = max(belief.predicted_cov[0, 0], belief.predicted_cov[2, 2])
-    cx, cy, spread = centroid(network, bitmap, b, c)
-    if 0.0 < spread[0] < variance:
-        x, y, variance = cx, cy, spread[0]
-    return x, y, c.tracking.gate_m + GATE_SDS * np.sqrt(variance)
+    mean = centroid(nodes, c)
+    if 0.0 < mean.spread[0] < variance:
+        x, y, variance = mean.x, mean.y, mean.spread[0]
+    return Circle(x, y, c.tracking.gate_m + GATE_SDS * np.sqrt(variance))
 
 
 @lean_piece
-def list_boundary(gate: Any, positions: np.ndarray, reports: Any, nodes: np.ndarray, b: int, c: Any) -> tuple[Any, ...]:
-    """The boundary nodes that stand close enough to the circle expected, in `nodes`; their number, and how many there
-    were in all."""
-    n, told = 0, 0
+def list_boundary(circle: Circle, nodes: Nodes, reports: Any, b: int, room: np.ndarray, c: Any) -> Boundary:
+    """The boundary nodes of row b, in `room`."""
+    n, reported = 0, 0
     for k in range(reports.count[b]):
         node, changed = reports.node[b, k], reports.value[b, k, 1]
         if changed != 0.0:
-            told += 1
-            if abs(np.sqrt(squared_distance(positions, node, gate[0], gate[1])) - c.radius_m) <= gate[2]:
-                nodes[n] = node
+            reported += 1
+            distance = np.sqrt(squared_distance(nodes.positions, node, circle.x, circle.y))
+            if abs(distance - c.radius_m) <= circle.tolerance_m:
+                room[n] = node
                 n += 1
-    return n, told
+    return Boundary(room[:n], reported)
 
 
 @lean_piece
-def update_by_position(
-    belief: Any,
-    network: Any,
-    bitmap: np.ndarray,
-    nodes: np.ndarray,
-    told: Any,
-    gate: Any,
-    restarts: Any,
-    variant: int,
-    b: int,
-    c: Any,
-) -> None:
-    """Correct with a fix or a centroid, if there is one."""
+def update_by_fix(belief: Any, fix: Fix, variant: int, starts: Any) -> None:
+    """Correct with where the target is by the reports."""
     mean, cov = belief.mean, belief.cov
-    x, y, spread, age = locate(belief, network, bitmap, nodes, told, gate, variant, b, c)
-    if spread[0] == 0.0:
-        return
+    x, y, spread, age = fix
     if variant == RAW or variant == CENTROID:
         _stand_at(x, y, spread, mean, cov)
-    elif restarts and variant != MIDPOINT:
+    elif starts and variant != MIDPOINT:
         for i in range(4):
             cov[i] = 0.0
             cov[i, i] = UNKNOWN
@@ -186,52 +215,46 @@ def update_by_position(
 
 
 @lean_piece
-def locate(
-    belief: Any, network: Any, bitmap: np.ndarray, nodes: np.ndarray, told: Any, gate: Any, variant: int, b: int, c: Any
-) -> tuple[Any, ...]:
-    """Where the target is by this period's reports alone.
+def locate(mean: np.ndarray, nodes: Nodes, boundary: Boundary, circle: Circle, variant: int, c: Any) -> Fix:
+    """The fix of the boundary nodes, or the centroid that stands in for it.
 
     The covariance of a fix is that of nodes that are off the circle by the radial part of an instant uniform in the
     period: on average over those met, of variance (|v| T)^2 / 18, and 1 m^2.
-
-    Returns: x, y [m], the covariance xx, xy, yy, zeros where it is not told, and how long ago that was [s].
     """
-    mean, half = belief.mean, 0.5 * c.period_s
+    half = 0.5 * c.period_s
     if variant < CENTROID:
-        refused = told > len(nodes)
-        if len(nodes) >= FEWEST:
-            x, y, condition, inverse = circle_centre(network.positions[b], nodes)
+        refused = boundary.reported > len(boundary.nodes)
+        if len(boundary.nodes) >= FEWEST:
+            x, y, condition, inverse = circle_centre(nodes.positions, boundary.nodes)
             if condition <= (WELL_CONDITIONED if variant == MIDPOINT else SINGULAR):
-                if np.sqrt((x - gate[0]) ** 2 + (y - gate[1]) ** 2) <= gate[2]:
+                if np.sqrt((x - circle.x) ** 2 + (y - circle.y) ** 2) <= circle.tolerance_m:
                     way = (mean[1] ** 2 + mean[3] ** 2) * c.period_s**2
                     scale = c.radius_m**2 * (1.0 + way / 18.0)
                     spread = scale * inverse[0], scale * inverse[1], scale * inverse[2]
                     if variant == MIDPOINT:
-                        return x, y, spread, half
+                        return Fix(x, y, spread, half)
                     # The same sign for nodes that were entered and left.
-                    return x + half * mean[1], y + half * mean[3], spread, 0.0
+                    return Fix(x + half * mean[1], y + half * mean[3], spread, 0.0)
                 refused = True
-        if told == 0 or (variant == MIDPOINT and not refused):
-            return 0.0, 0.0, (0.0, 0.0, 0.0), 0.0
-    x, y, spread = centroid(network, bitmap, b, c)
-    return x, y, spread, 0.0
+        if boundary.reported == 0 or (variant == MIDPOINT and not refused):
+            return Fix(0.0, 0.0, (0.0, 0.0, 0.0), 0.0)
+    return centroid(nodes, c)
 
 
 @lean_piece
-def centroid(network: Any, bitmap: np.ndarray, b: int, c: Any) -> tuple[Any, ...]:
+def centroid(nodes: Nodes, c: Any) -> Fix:
     """Mean of the awake nodes that detect, each uniform in a disc: variance R^2 / (4 n) on an axis."""
-    positions, standing, members = network.positions[b], network.row[b], network.members[b]
     x, y, n = 0.0, 0.0, 0
-    for k in range(-1 if standing.head >= 0 else 0, standing.n_members):
-        node = standing.head if k < 0 else members[k]
-        if bitmap[node] != 0 and network.battery[b, node] > 0.0:
-            x += positions[node, 0]
-            y += positions[node, 1]
+    for k in range(-1 if nodes.standing.head >= 0 else 0, nodes.standing.n_members):
+        node = nodes.standing.head if k < 0 else nodes.members[k]
+        if nodes.bitmap[node] != 0 and nodes.battery[node] > 0.0:
+            x += nodes.positions[node, 0]
+            y += nodes.positions[node, 1]
             n += 1
     if n == 0:
-        return 0.0, 0.0, (0.0, 0.0, 0.0)
+        return Fix(0.0, 0.0, (0.0, 0.0, 0.0), 0.0)
     variance = c.radius_m**2 / (4.0 * n)
-    return x / n, y / n, (variance, 0.0, variance)
+    return Fix(x / n, y / n, (variance, 0.0, variance), 0.0)
 
 
 @lean_piece

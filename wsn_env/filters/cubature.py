@@ -14,7 +14,7 @@ from wsn_env.compiled.kernels import kernel, over_rows, piece
 from wsn_env.filters.base import MomentTracker
 from wsn_env.models.measurement.base import at_point, linearise, node_at, unwrap
 from wsn_env.models.motion.prediction import predict_moments
-from wsn_env.models.state import Belief, Network, Reports
+from wsn_env.models.state import Belief, Network, Reports, network_at, reports_at
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import constants
 
@@ -40,8 +40,8 @@ class _CubatureTracker(MomentTracker):
         resampled: np.ndarray,
     ) -> None:
         """Predict and correct every row, in place."""
-        rest = self.iterations, belief.row, network.positions, reports.count, reports.node, reports.value
-        over_rows(_correct_rows, len(keys), self._threads, self._constants, *rest)
+        arguments = self._constants, self.iterations, belief.row, network.handle, reports.handle
+        over_rows(_correct_rows, len(keys), self._threads, *arguments)
 
 
 class CKFTracker(_CubatureTracker):
@@ -60,20 +60,20 @@ class ICKFTracker(_CubatureTracker):
 
 
 @kernel
-def _correct_rows(start, stop, cs, iterations, beliefs, positions, count, node, value):
-    c = cs[0]
+def _correct_rows(start, stop, cs, iterations, beliefs, network_handle, reports_handle):
+    network, reports, c = network_at(network_handle), reports_at(reports_handle), cs[0]
     prior, prior_cov = np.empty(4), np.empty((4, 4))
     for b in range(start, stop):
         mean, cov = beliefs[b].mean, beliefs[b].cov
         predict_moments(mean, cov, c.period_s, c.tracking.q, prior, prior_cov)
         mean[:], cov[:] = prior, prior_cov
-        heard = count[b]
-        if heard == 0:
+        positions, nodes, values = network.positions[b], reports.node[b, : reports.count[b]], reports.value[b]
+        if len(nodes) == 0:
             continue
         for _ in range(iterations):
             x, y = mean[0], mean[2]
-            about, told, variance = _expect_about(x, y, positions[b], node[b, :heard], value[b], c)
-            slope, level, residual = _fit(mean, cov, positions[b], node[b, :heard], about, c)
+            about, told, variance = _expect_about(x, y, positions, nodes, values, c)
+            slope, level, residual = _fit(mean, cov, positions, nodes, about, c)
             for i in range(len(told)):  # what is told beyond the fit at the prior
                 residual[i, i] += variance[i]
                 level[i] = told[i] - level[i]
@@ -85,7 +85,7 @@ def _correct_rows(start, stop, cs, iterations, beliefs, positions, count, node, 
 
 
 @piece
-def _expect_about(x, y, positions, nodes, value, c):
+def _expect_about(x, y, positions, nodes, values, c):
     """What these nodes are expected to measure of a target at (x, y), what they have measured, told near that, and the
     variance of the noise: (m,) each, all numbers of a node's value one after the other."""
     size = 0
@@ -97,7 +97,7 @@ def _expect_about(x, y, positions, nodes, value, c):
         k = 0
         for line in linearise(c.measurement, node_at(positions, nodes[j]), at_point(x, y)):
             about[i], variance[i] = line.expected, line.variance
-            told[i] = unwrap(c.measurement, value[j, k], line.expected)
+            told[i] = unwrap(c.measurement, values[j, k], line.expected)
             i, k = i + 1, k + 1
     return about, told, variance
 

@@ -1,5 +1,7 @@
 """The extended and the unscented Kalman filter, through filterpy."""
 
+from typing import Any
+
 import numpy as np
 
 from wsn_env.filters.base import MomentTracker
@@ -19,19 +21,31 @@ def constant_velocity(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     return np.array([[1, t, 0, 0], [0, 1, 0, 0], [0, 0, 1, t], [0, 0, 0, 1.0]]), q * q * gain @ gain.T
 
 
-class EKFTracker(MomentTracker):
-    """filterpy's ExtendedKalmanFilter: each report corrects in turn, in the order of the nodes.
+class FilterpyTracker(MomentTracker):
+    """Base of the trackers that one of filterpy's filters predicts and corrects: final classes add `update`.
 
-    A linear measurement, such as a position, makes it exact; others are linearised at the current mean. It keeps
-    no memory but the belief, and loops over rows: its speed is filterpy's.
+    They keep no memory but the belief, and loop over rows: their speed is filterpy's.
+
+    Args:
+        kalman: the filter.
     """
 
-    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False) -> None:
-        from filterpy.kalman import ExtendedKalmanFilter  # takes a second or two to import
+    def __init__(self, kalman: Any) -> None:
+        self._filter = kalman
 
-        self._model = LinearModel(scenario)
-        self._filter = ExtendedKalmanFilter(dim_x=4, dim_z=2)
-        self._filter.F, self._filter.Q = constant_velocity(scenario)
+    def update(self, nodes: np.ndarray, places: np.ndarray, values: np.ndarray) -> None:
+        """Correct the filter with a period's reports.
+
+        Args:
+            nodes: (n,) who reported, n > 0.
+            places: (n, 2) where they stand [m].
+            values: (n, 2) what they measured.
+        """
+        raise NotImplementedError
+
+    def repair(self, cov: np.ndarray) -> np.ndarray:
+        """A covariance (4, 4) without what rounding has done to it."""
+        return 0.5 * (cov + cov.T)
 
     def correct(
         self,
@@ -43,28 +57,48 @@ class EKFTracker(MomentTracker):
         resampled: np.ndarray,
     ) -> None:
         """Predict and correct every row, in place."""
-        ekf = self._filter
+        kalman = self._filter
         for b in range(len(keys)):
-            ekf.x, ekf.P = belief.mean[b].copy(), belief.cov[b].copy()
-            ekf.predict()
-            for j in range(reports.count[b]):
-                self._update(network.positions[b, reports.node[b, j]], reports.value[b, j])
-            belief.mean[b], belief.cov[b] = ekf.x, 0.5 * (ekf.P + ekf.P.T)
+            kalman.x, kalman.P = belief.mean[b].copy(), belief.cov[b].copy()
+            kalman.predict()
+            nodes, values = reports.node[b, : reports.count[b]], reports.value[b, : reports.count[b]]
+            if len(nodes):
+                self.update(nodes, network.positions[b, nodes], values)
+            belief.mean[b], belief.cov[b] = kalman.x, self.repair(kalman.P)
 
-    def _update(self, node: np.ndarray, value: np.ndarray) -> None:
+
+class EKFTracker(FilterpyTracker):
+    """filterpy's ExtendedKalmanFilter: each report corrects in turn, in the order of the nodes.
+
+    A linear measurement, such as a position, makes it exact; others are linearised at the current mean.
+    """
+
+    def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False) -> None:
+        from filterpy.kalman import ExtendedKalmanFilter  # takes a second or two to import
+
+        super().__init__(ExtendedKalmanFilter(dim_x=4, dim_z=2))
+        self._model = LinearModel(scenario)
+        self._filter.F, self._filter.Q = constant_velocity(scenario)
+
+    def update(self, nodes: np.ndarray, places: np.ndarray, values: np.ndarray) -> None:
+        """Correct with one report after the other."""
+        for place, value in zip(places, values):
+            self._update_by_one(place, value)
+
+    def _update_by_one(self, place: np.ndarray, value: np.ndarray) -> None:
         x, _, y, _ = self._filter.x
-        lines = self._model.lines(x, y, node[None], value[None])
+        lines = self._model.lines(x, y, place[None], value[None])
         rows = np.zeros((self._model.values, 4))
         rows[:, [0, 2]] = lines.slope[0]
         noise = np.diag(lines.variance[0])
         self._filter.update(lines.value[0], HJacobian=lambda x: rows, Hx=lambda x: lines.expected[0], R=noise)
 
 
-class UKFTracker(MomentTracker):
+class UKFTracker(FilterpyTracker):
     """filterpy's UnscentedKalmanFilter: 9 points (alpha = .1, beta = 2, kappa = -1), all reports at once.
 
-    Van der Merwe (2004). Keeps no memory but the belief; a covariance that has lost its sign, as the negative weight
-    of the central point allows, gets it back.
+    Van der Merwe (2004). A covariance that has lost its sign, as the negative weight of the central point allows, gets
+    it back.
     """
 
     def __init__(self, scenario: Scenario, threads: int = 1, fast: bool = False) -> None:
@@ -72,41 +106,29 @@ class UKFTracker(MomentTracker):
 
         transition, noise = constant_velocity(scenario)
         points = MerweScaledSigmaPoints(4, alpha=0.1, beta=2.0, kappa=-1.0, sqrt_method=square_root)
-        self._filter = UnscentedKalmanFilter(
-            dim_x=4, dim_z=1, dt=scenario.period_s, hx=None, fx=lambda x, dt: transition @ x, points=points
+        super().__init__(
+            UnscentedKalmanFilter(
+                dim_x=4, dim_z=1, dt=scenario.period_s, hx=None, fx=lambda x, dt: transition @ x, points=points
+            )
         )
         self._filter.Q = noise
         self._model = LinearModel(scenario)
 
-    def correct(
-        self,
-        keys: np.ndarray,
-        periods: np.ndarray,
-        belief: Belief,
-        network: Network,
-        reports: Reports,
-        resampled: np.ndarray,
-    ) -> None:
-        """Predict and correct every row, in place."""
-        ukf = self._filter
-        for b in range(len(keys)):
-            ukf.x, ukf.P = belief.mean[b].copy(), belief.cov[b].copy()
-            ukf.predict()
-            n = reports.count[b]
-            if n > 0:
-                self._update(network.positions[b, reports.node[b, :n]], reports.value[b, :n])
-            root = square_root(ukf.P)
-            belief.mean[b], belief.cov[b] = ukf.x, root.T @ root
-
-    def _update(self, nodes: np.ndarray, values: np.ndarray) -> None:
+    def update(self, nodes: np.ndarray, places: np.ndarray, values: np.ndarray) -> None:
+        """Correct with all reports at once."""
         x, _, y, _ = self._filter.x
-        about = self._model.lines(x, y, nodes, values)
+        about = self._model.lines(x, y, places, values)
 
         def expect(state):
-            there = self._model.lines(state[0], state[2], nodes, values)
+            there = self._model.lines(state[0], state[2], places, values)
             return self._model.near(there.expected, about.expected).ravel()
 
         self._filter.update(about.value.ravel(), R=np.diag(about.variance.ravel()), hx=expect)
+
+    def repair(self, cov: np.ndarray) -> np.ndarray:
+        """Without negative variances."""
+        root = square_root(cov)
+        return root.T @ root
 
 
 def square_root(cov: np.ndarray) -> np.ndarray:

@@ -38,7 +38,7 @@ class LinearModel:
         n, k = len(places), self.values
         made = np.empty((n, k)), np.empty((n, k)), np.empty((n, k, 2)), np.empty((n, k))
         places, values = np.ascontiguousarray(places, float), np.ascontiguousarray(values, float)
-        _linearise(self._constants, float(x), float(y), places, values, *made)
+        _linearise(self._constants, float(x), float(y), places, values, made)
         return Lines(*made)
 
     def near(self, values: np.ndarray, about: Any) -> np.ndarray:
@@ -66,11 +66,12 @@ class LinearModel:
 
 
 @kernel
-def _linearise(cs, x, y, places, values, told, expected, slopes, variances):
+def _linearise(cs, x, y, places, values, lines):
+    """Fill in the arrays of `lines`: the fields of Lines."""
+    told, expected, slopes, variances = lines
     for i in range(len(places)):
-        lines = linearise(cs[0].measurement, node_at(places, i), at_point(x, y))
         k = 0
-        for line in lines:
+        for line in linearise(cs[0].measurement, node_at(places, i), at_point(x, y)):
             expected[i, k], variances[i, k] = line.expected, line.variance
             slopes[i, k, 0], slopes[i, k, 1] = line.slope_x, line.slope_y
             told[i, k] = unwrap(cs[0].measurement, values[i, k], line.expected)

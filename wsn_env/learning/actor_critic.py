@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import torch
 from stable_baselines3 import PPO
@@ -10,6 +10,8 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.type_aliases import Schedule
 from torch import nn
 
+from wsn_env.envs.features import BELIEF_FEATURES, CANDIDATE_FEATURES
+from wsn_env.envs.prospects import ENTRY_FEATURES
 from wsn_env.learning.network import EntryNetwork, FlatNetwork, Network
 
 
@@ -78,6 +80,26 @@ class EntryActorCritic(nn.Module):
             if layer.bias is not None:
                 arrays[f"{name}.bias"] = layer.bias.detach().cpu().numpy()
         return EntryNetwork(arrays)
+
+
+def entry_sizes(
+    action: Literal["menu", "subset"], observation: Any, actor: tuple[int, int], critic: tuple[int, int]
+) -> dict[str, Any]:
+    """The arguments of EntryActorCritic that suit an environment.
+
+    Args:
+        action: what is chosen from.
+        observation: the space of one environment's observations.
+        actor, critic: units of the two hidden layers.
+    """
+    return dict(
+        belief=len(BELIEF_FEATURES),
+        entry=len(ENTRY_FEATURES if action == "menu" else CANDIDATE_FEATURES),
+        observation=observation.shape[0],
+        outputs=1 if action == "menu" else 2,
+        actor=actor,
+        critic=critic,
+    )
 
 
 class EntryPolicy(ActorCriticPolicy):

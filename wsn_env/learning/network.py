@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -20,16 +20,13 @@ def _add_product(x: np.ndarray, w: np.ndarray, out: np.ndarray) -> None:
 
 
 @kernel
-def _run_flat(
-    observations: np.ndarray,
-    w0: np.ndarray,
-    b0: np.ndarray,
-    w1: np.ndarray,
-    b1: np.ndarray,
-    w2: np.ndarray,
-    b2: np.ndarray,
-    out: np.ndarray,
-) -> None:
+def _run_flat(observations: np.ndarray, weights: Any, out: np.ndarray) -> None:
+    """Fill out (B, logits).
+
+    Args:
+        weights: FlatNetwork's arrays in order.
+    """
+    w0, b0, w1, b1, w2, b2 = weights
     h0, h1 = np.empty(len(b0), F), np.empty(len(b1), F)
     for row in range(len(observations)):
         h0[:] = b0
@@ -45,17 +42,13 @@ def _run_flat(
 
 
 @kernel
-def _run_entries(
-    observations: np.ndarray,
-    belief_w: np.ndarray,
-    belief_b: np.ndarray,
-    entry_w: np.ndarray,
-    hidden_w: np.ndarray,
-    hidden_b: np.ndarray,
-    score_w: np.ndarray,
-    score_b: np.ndarray,
-    out: np.ndarray,
-) -> None:
+def _run_entries(observations: np.ndarray, weights: Any, out: np.ndarray) -> None:
+    """Fill out (B, K, outputs).
+
+    Args:
+        weights: EntryNetwork's arrays in order.
+    """
+    belief_w, belief_b, entry_w, hidden_w, hidden_b, score_w, score_b = weights
     size, width = belief_w.shape[0], entry_w.shape[0]
     context, h0, h1 = np.empty(len(belief_b), F), np.empty(len(belief_b), F), np.empty(len(hidden_b), F)
     for row in range(len(observations)):
@@ -131,7 +124,7 @@ class FlatNetwork(Network):
     def logits(self, observations: np.ndarray) -> np.ndarray:
         """(B, logits) float32 from observations (B, observation) float32."""
         out = np.empty((len(observations), self.sizes["logits"]), F)
-        _run_flat(np.ascontiguousarray(observations, F), *self.arrays.values(), out)
+        _run_flat(np.ascontiguousarray(observations, F), tuple(self.arrays.values()), out)
         return out
 
     def fits(self, inputs: int, logits: int) -> bool:
@@ -167,7 +160,7 @@ class EntryNetwork(Network):
             nobody = np.zeros((len(observations), entry), F)
             observations = np.concatenate([observations[:, :belief], nobody, observations[:, belief:]], axis=1)
         out = np.empty((len(observations), (observations.shape[1] - belief) // entry, outputs), F)
-        _run_entries(observations, *self.arrays.values(), out)
+        _run_entries(observations, tuple(self.arrays.values()), out)
         if outputs == 1:
             return out[:, :, 0]
         awake = np.stack([np.zeros_like(out[:, 1:, 1]), out[:, 1:, 1]], axis=2)

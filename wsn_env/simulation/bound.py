@@ -89,7 +89,6 @@ class Bound:
         self._constants["tracking"]["q"] = process_noise(scenario)
         if scenario.detection.values_decide:
             self._constants["reach_m"] = np.inf  # noise lifts a level over the threshold from anywhere
-        self._asked_first = scenario.tracking.start == "search"
         self._memory, self._advance = np.zeros(rows, MEMORY), Pinned(_advance)
 
     def begin(self, state: State, rows: np.ndarray | None = None) -> np.ndarray:
@@ -103,7 +102,7 @@ class Bound:
         """
         rows = np.ones(len(self._memory), bool) if rows is None else np.asarray(rows, bool)
         bound_m = np.empty(len(rows))
-        _begin(0, len(rows), self._constants, self._start, rows, state.handle, self._memory, bound_m)
+        _begin(self._constants, self._start, rows, state.handle, self._memory, bound_m)
         return bound_m
 
     def advance(self, state: State, outcome: Outcome) -> np.ndarray:
@@ -135,16 +134,15 @@ class Bound:
         Returns: (B,), 0 in other rows.
         """
         rows = np.ones(state.rows, bool) if rows is None else np.asarray(rows, bool)
-        floor_m, memory = np.zeros(len(rows)), np.zeros(len(rows), MEMORY)
-        arguments = self._constants, self._start, self._asked_first, rows, state.handle, memory, floor_m
-        over_rows(_floors, len(rows), threads_for(rows, self._threads), *arguments)
-        return floor_m
+        memory, threads = np.zeros(len(rows), MEMORY), threads_for(rows, self._threads)
+        over_rows(_play_floors, len(rows), threads, self._constants, self._start, rows, state.handle, memory)
+        return np.sqrt(memory["squares"] / self._periods)
 
 
 @lean_kernel
-def _begin(start, stop, cs, starts, rows, handle, memory, bound_m):
+def _begin(cs, starts, rows, handle, memory, bound_m):
     state, c = state_at(handle), cs[0]
-    for b in range(start, stop):
+    for b in range(len(rows)):
         own = memory[b]
         if rows[b]:
             _start_anew(own, starts[0])
@@ -165,20 +163,20 @@ def _advance(start, stop, cs, outcomes, handle, memory, bound_m):
 
 
 @lean_kernel
-def _floors(start, stop, cs, starts, asked_first, rows, handle, memory, floor_m):
+def _play_floors(start, stop, cs, starts, rows, handle, memory):
+    """A whole episode with all nodes awake, in the rows marked; `memory` holds what the last period leaves."""
     state, c = state_at(handle), cs[0]
     for b in range(start, stop):
         if not rows[b]:
             continue
-        own, periods = memory[b], state.track.shape[1] - 1
+        own = memory[b]
         _start_anew(own, starts[0])
-        if asked_first:
+        if starts[0].searches:
             xx, xy, yy = _information_of_all(state, b, 0, c)
             _correct(own.cov, xx, xy, yy)
-        for k in range(1, periods + 1):
+        for k in range(1, state.track.shape[1]):
             xx, xy, yy = _information_of_all(state, b, k, c)
             _take_period(own, xx, xy, yy, c)
-        floor_m[b] = np.sqrt(own.squares / periods)
 
 
 @lean_piece

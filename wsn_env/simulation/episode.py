@@ -16,7 +16,8 @@ from wsn_env.simulation.messages import clear_ledger
 
 START = record(
     [
-        ("known", "i8"),
+        ("known", "i8"),  # 1: the first belief is about the truth
+        ("searches", "i8"),  # 1: a search in period 0
         ("sd_m", "f8"),
         ("sd_ms", "f8"),
         ("battery", "f8"),
@@ -37,7 +38,7 @@ def start_record(scenario: Scenario) -> np.ndarray:
     """What `begin` needs, an array of one: P0, battery, lam, layout and extent, the seed of a fixed field."""
     known = scenario.tracking.start == "known"
     made = np.zeros(1, START)
-    made["known"] = known
+    made["known"], made["searches"] = known, scenario.tracking.start == "search"
     made["sd_m"] = scenario.tracking.start_sd_m if known else scenario.field.side_m / 12**0.5
     made["sd_ms"] = scenario.tracking.start_sd_ms if known else scenario.tracking.rest_sd_ms
     made["battery"] = scenario.radio.battery_j
@@ -117,16 +118,22 @@ class Tracks:
 
     def draw(self, rows: np.ndarray, keys: np.ndarray, tracks: np.ndarray, threads: int) -> None:
         """Fill tracks (B, periods + 1, 4) in the rows marked."""
-        over_rows(_draw_tracks, len(rows), threads, self._motion, *self._course, rows, keys, tracks)
+        over_rows(_draw_tracks, len(rows), threads, self._motion, self._course, rows, keys, tracks)
 
 
 @kernel
-def _draw_tracks(start, stop, cs, period_s, side_m, depth_m, recorded, rows, keys, tracks):
-    course = Course(period_s, side_m, depth_m, recorded)
+def _draw_tracks(start, stop, cs, course, rows, keys, tracks):
+    """Fill tracks in the rows marked.
+
+    Args:
+        course: the fields of a Course.
+    """
+    period_s, side_m, depth_m, recorded = course
     for b in range(start, stop):
         if rows[b]:
             track = tracks[b]
-            draw(cs[0], draws.stream(keys[b], 0, draws.TRACK), course, track)
+            stream = draws.stream(keys[b], 0, draws.TRACK)
+            draw(cs[0], stream, Course(period_s, side_m, depth_m, recorded), track)
             for state in track:
                 reflect(state, 0, side_m)
                 reflect(state, 2, depth_m)

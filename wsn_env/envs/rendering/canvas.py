@@ -31,7 +31,7 @@ class Canvas:
         self._most = np.zeros(image.shape[:2], np.float32)
         self._steps = np.zeros(self.width + 1, np.float32)
 
-    def discs(self, centres: Any, radius: float, colour: str, hole: float = -10.0, square: bool = False) -> None:
+    def discs(self, centres: Any, radius: float, colour: Any, hole: float = -10.0, square: bool = False) -> None:
         """Discs, rings or squares of one size.
 
         Args:
@@ -44,7 +44,7 @@ class Canvas:
         colours = _numbers(colour).reshape(-1, 3)
         strokes.draw_discs(self.image, self.clip, _points(centres), float(radius), float(hole), square, colours)
 
-    def lines(self, starts: Any, ends: Any, width: float, colour: str, opacity: float = 1.0) -> None:
+    def lines(self, starts: Any, ends: Any, width: Any, colour: Colour, opacity: Any = 1.0) -> None:
         """Lines with round ends; where they meet they do not darken each other.
 
         Args:
@@ -53,12 +53,12 @@ class Canvas:
             colour: (3,).
             opacity: a number, or (N,) of each.
         """
-        starts = _points(starts)
+        starts, ends = _points(starts), _points(ends)
         widths, opacities = (np.full(len(starts), value, np.float64) for value in (width, opacity))
-        ends = _points(ends)
-        strokes.draw_lines(self.image, self._most, self.clip, starts, ends, widths, opacities, _numbers(colour))
+        lines = starts, ends, widths, opacities
+        strokes.draw_lines(self.image, self._most, self.clip, lines, _numbers(colour))
 
-    def cloud(self, x: np.ndarray, y: np.ndarray, weights: Any, colour: str) -> None:
+    def cloud(self, x: np.ndarray, y: np.ndarray, weights: Any, colour: Colour) -> None:
         """Points (P,); where they are many, or their weights large, the colour is deeper."""
         strokes.draw_cloud(self.image, self._most, self.clip, *map(_numbers, (x, y, weights, colour)))
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from wsn_env.envs.rendering.canvas import Canvas, text_width
+from wsn_env.envs.rendering.canvas import Canvas, Colour, text_width
 from wsn_env.envs.rendering.marks import draw_arrow, draw_crosses, draw_estimate, draw_target
 from wsn_env.envs.rendering.palette import (
     BLUE,
@@ -32,6 +34,36 @@ ELLIPSE = 5.991**0.5  # of a Gaussian in two dimensions 95 % lie within so many 
 FADED = 0.2  # the opacity of a tail's beginning
 
 
+class Scene(NamedTuple):
+    """What a frame shows: an environment of a batch."""
+
+    state: State  # after the period
+    scenario: Scenario
+    trail: Trail  # of the periods up to this one
+    row: int  # of the batch
+    nodes: np.ndarray  # (S, 2) px, where they stand on the frame
+
+    @property
+    def last(self) -> np.void:
+        """OUTCOME: what the period brought."""
+        return self.trail.last.row[self.row]
+
+    @property
+    def hands_over(self) -> bool:
+        """Whether the head's role went to another node, which counts where heads receive."""
+        return bool(self.last["handover"]) and self.scenario.radio.receiver == "head"
+
+    @property
+    def head(self) -> int:
+        """The standing head, -1: none."""
+        return self.state.network.head[self.row]
+
+    @property
+    def periods(self) -> int:
+        """How many are done, up to the horizon."""
+        return min(self.state.period[self.row], self.scenario.periods)
+
+
 def frame(state: State, scenario: Scenario, trail: Trail, row: int = 0, size: int = SIZE) -> np.ndarray:
     """A frame (size, size, 3) uint8 of a row. Nothing but the arguments decides a pixel, and none is changed.
 
@@ -44,23 +76,22 @@ def frame(state: State, scenario: Scenario, trail: Trail, row: int = 0, size: in
     """
     plan = plan_of(size, scenario.name, scenario.field.room_m, legend(scenario))
     canvas = Canvas(plan.paper.copy())
-    told = trail.last.row[row]
-    _write_head(canvas, plan, state, scenario, row, told, trail)
-    if told["searched"]:
+    scene = Scene(state, scenario, trail, row, plan.pixels(state.network.positions[row]))
+    _write_head(canvas, plan, scene)
+    if scene.last["searched"]:
         _flash(canvas, plan)
     view = View.of(state.only(row))
     awake, sees = np.flatnonzero(view.member[0]), np.flatnonzero(view.sees[0])
-    positions = plan.pixels(state.network.positions[row])
     if len(awake) and shows_radius(scenario):
         canvas.clip = plan.field
-        canvas.shade(positions[awake], scenario.radius_m * plan.scale, SENSED)
+        canvas.shade(scene.nodes[awake], scenario.radius_m * plan.scale, SENSED)
     canvas.clip = widened(plan.field, round(9 * plan.unit) + 1)
-    _draw_nodes(canvas, plan, state, scenario, row, positions)
-    _draw_cloud(canvas, plan, state, row)
-    _draw_cluster(canvas, plan, state, scenario, row, positions, awake, sees)
-    if told["handover"] and scenario.radio.receiver == "head":
-        _draw_handover(canvas, plan, positions, trail.head[row], state.period[row])
-    _draw_tracks(canvas, plan, state, scenario, row, trail)
+    _draw_nodes(canvas, plan, scene)
+    _draw_cloud(canvas, plan, scene)
+    _draw_cluster(canvas, plan, scene, awake, sees)
+    if scene.hands_over:
+        _draw_handover(canvas, plan, scene)
+    _draw_tracks(canvas, plan, scene)
     return canvas.image
 
 
@@ -72,9 +103,10 @@ def _flash(canvas: Canvas, plan: Plan) -> None:
     canvas.box(*plan.field, FLASH)
 
 
-def _draw_nodes(canvas, plan, state, scenario, row, positions) -> None:
+def _draw_nodes(canvas: Canvas, plan: Plan, scene: Scene) -> None:
     """Their inside is the paler the less energy they have left; the dead are crossed out."""
-    share = np.clip(state.network.battery[row] / scenario.radio.battery_j, 0.0, 1.0)
+    positions, battery_j = scene.nodes, scene.state.network.battery[scene.row]
+    share = np.clip(battery_j / scene.scenario.radio.battery_j, 0.0, 1.0)
     alive, radius = share > 0, _node_radius(plan, len(positions))
     canvas.discs(positions[alive], radius, FULL)
     if (share[alive] < 0.98).any() and radius > 1.5:
@@ -90,25 +122,26 @@ def _node_radius(plan: Plan, nodes: int) -> float:
     return min(max(0.11 * spacing, 0.7), max(3.5 * plan.unit, 1.8))
 
 
-def _draw_cloud(canvas, plan, state, row) -> None:
-    x, _, y, _ = state.belief.particles[row]
+def _draw_cloud(canvas: Canvas, plan: Plan, scene: Scene) -> None:
+    belief = scene.state.belief
+    x, _, y, _ = belief.particles[scene.row]
     if len(x):
-        weights = np.exp(state.belief.log_weights[row])
+        weights = np.exp(belief.log_weights[scene.row])
         left, _, _, bottom = plan.field
         weights *= SEEN * len(x) / max(weights.sum(), 1e-30)
         canvas.cloud(left + x * plan.scale, bottom - y * plan.scale, weights, SKY)
 
 
-def _draw_cluster(canvas, plan, state, scenario, row, positions, awake, sees) -> None:
+def _draw_cluster(canvas: Canvas, plan: Plan, scene: Scene, awake: np.ndarray, sees: np.ndarray) -> None:
     """Reports as lines to who receives them; rings about those that see; the awake, the head, the sink."""
-    unit, receiver = plan.unit, scenario.radio.receiver
-    head = state.network.head[row]
-    reported = state.reports.node[row, : state.reports.count[row]]
+    unit, receiver = plan.unit, scene.scenario.radio.receiver
+    head, positions, reports = scene.head, scene.nodes, scene.state.reports
+    reported = reports.node[scene.row, : reports.count[scene.row]]
     centre = None
     if receiver == "sink":
-        centre = plan.pixels(np.array(scenario.field.room_m) / 2)
+        centre = plan.pixels(np.array(scene.scenario.field.room_m) / 2)
     elif receiver == "target":
-        centre = plan.pixels(_target(state, scenario, row))
+        centre = plan.pixels(scene.state.track[scene.row, scene.periods, ::2])
     elif head >= 0:
         centre = positions[head]
     if centre is not None and len(reported):
@@ -130,29 +163,25 @@ def _draw_cluster(canvas, plan, state, scenario, row, positions, awake, sees) ->
         canvas.discs(centre, 1.3 * radius, VERMILION, square=True)
 
 
-def _draw_handover(canvas, plan, positions, heads, period) -> None:
+def _draw_handover(canvas: Canvas, plan: Plan, scene: Scene) -> None:
     """An arrow from the last head to the present one."""
-    period = min(period, len(heads) - 1)
-    old, new = heads[period - 1], heads[period]
+    heads, last = scene.trail.head[scene.row], scene.periods
+    old, new = heads[last - 1], heads[last]
     if old >= 0 and new >= 0:
-        draw_arrow(canvas, positions[old], positions[new], max(2.0, 3.0 * plan.unit), max(6.0, 10.0 * plan.unit))
+        ends = scene.nodes[old], scene.nodes[new]
+        draw_arrow(canvas, *ends, max(2.0, 3.0 * plan.unit), max(6.0, 10.0 * plan.unit))
 
 
-def _draw_tracks(canvas, plan, state, scenario, row, trail) -> None:
+def _draw_tracks(canvas: Canvas, plan: Plan, scene: Scene) -> None:
     """Where the target was and is; where the head believed it to be and does, with the ellipse of 95 %."""
-    unit, belief = plan.unit, state.belief
-    last = min(state.period[row], scenario.periods)
+    unit, row, last, belief = plan.unit, scene.row, scene.periods, scene.state.belief
     fading = np.linspace(FADED, 1.0, max(last, 1))
-    target = plan.pixels(state.track[row, : last + 1, ::2])
+    target = plan.pixels(scene.state.track[row, : last + 1, ::2])
     canvas.lines(target[:-1], target[1:], max(1.2, 2.4 * unit), GREEN, fading)
-    believed = plan.pixels(trail.estimate_m[row, : last + 1])
+    believed = plan.pixels(scene.trail.estimate_m[row, : last + 1])
     canvas.lines(believed[:-1], believed[1:], max(1.0, 1.2 * unit), INK, fading)
     draw_target(canvas, target[-1], unit)
     draw_estimate(canvas, plan.pixels(belief.mean[row, ::2]), unit, plan.scale * _root(belief.cov[row, ::2, ::2]))
-
-
-def _target(state, scenario, row) -> np.ndarray:
-    return state.track[row, min(state.period[row], scenario.periods), ::2]
 
 
 def _root(cov) -> np.ndarray:
@@ -166,29 +195,22 @@ def _root(cov) -> np.ndarray:
 # --- words --------------------------------------------------------------------------------------------------------
 
 
-def _write_head(canvas, plan, state, scenario, row, told, trail) -> None:
+def _write_head(canvas: Canvas, plan: Plan, scene: Scene) -> None:
     """Above the field: scenario, period, what is going on; the numbers of the period and of the episode so far."""
-    font, edge, y = plan.font, plan.font // 2 + 1, plan.font // 3
+    state, scenario, trail, row, _ = scene
+    font, edge, y = plan.font, _edge(plan), plan.font // 3
     x = canvas.text(edge, y, scenario.name, font, INK) + font if canvas.width >= WORDS_FROM else edge
-    right = canvas.width - edge
     words = f"period {state.period[row]} of {scenario.periods}"
-    if x + text_width(words, font) > right:
+    if x + text_width(words, font) > canvas.width - edge:
         words = f"{state.period[row]}/{scenario.periods}"
     taken = canvas.text(x, y, words, font, DIM)
-    nodes, alive = state.network.battery.shape[1], state.network.row["alive"][row]
-    if alive < nodes:
-        words = f"{alive} of {nodes} alive" if alive else "all dead"
-        right = _chip(canvas, plan, taken, right, y, words, PAPER, DIM if alive else VERMILION)
-    if told["searched"]:
-        right = _chip(canvas, plan, taken, right, y, "search", YELLOW, INK)
-    if told["handover"] and scenario.radio.receiver == "head":
-        _chip(canvas, plan, taken, right, y, "handover", PURPLE, INK)
+    _write_chips(canvas, plan, _chips(scene), taken, y)
     if canvas.width < WORDS_FROM:
         return
     y += plan.line
-    rms = trail.rms_m(state, row)
-    error = [("error ", f"{figure(told['error_m'])} m"), ("   rms ", "-" if np.isnan(rms) else f"{figure(rms)} m")]
-    energy = [("energy ", joules(told["energy_mj"])), ("   so far ", joules(trail.energy_mj[row]))]
+    last, rms = scene.last, trail.rms_m(state, row)
+    error = [("error ", f"{figure(last['error_m'])} m"), ("   rms ", "-" if np.isnan(rms) else f"{figure(rms)} m")]
+    energy = [("energy ", joules(last["energy_mj"])), ("   so far ", joules(trail.energy_mj[row]))]
     taken = _write(canvas, edge, y, error, font)
     for pairs in (energy, energy[:1]):
         left = canvas.width - edge - sum(text_width(label + value, font) for label, value in pairs)
@@ -204,15 +226,33 @@ def _write(canvas, x, y, pairs, font) -> int:
     return x
 
 
-def _chip(canvas, plan, taken, right, y, words, colour, ink) -> int:
-    """A word on a coloured ground between `taken` and `right`, if it fits; returns where the next may end."""
-    pad = plan.font // 3
-    left = right - text_width(words, plan.font) - 2 * pad
-    if left < taken + pad:
-        return right
-    canvas.box(left, y - pad // 2, right, y + plan.line - pad // 2, colour)
-    canvas.text(left + pad, y, words, plan.font, ink, colour)
-    return left - pad
+def _edge(plan: Plan) -> int:
+    """px that words keep from the sides."""
+    return plan.font // 2 + 1
+
+
+def _chips(scene: Scene) -> list[tuple[str, Colour, Colour]]:
+    """What is going on, each with its ground and ink."""
+    nodes, alive = len(scene.nodes), scene.state.network.row["alive"][scene.row]
+    chips = []
+    if alive < nodes:
+        chips.append((f"{alive} of {nodes} alive", PAPER, DIM) if alive else ("all dead", PAPER, VERMILION))
+    if scene.last["searched"]:
+        chips.append(("search", YELLOW, INK))
+    if scene.hands_over:
+        chips.append(("handover", PURPLE, INK))
+    return chips
+
+
+def _write_chips(canvas: Canvas, plan: Plan, chips: list[tuple[str, Colour, Colour]], taken: int, y: int) -> None:
+    """Words on coloured grounds from the right edge to what is taken of the line, those that fit."""
+    right, pad = canvas.width - _edge(plan), plan.font // 3
+    for words, ground, ink in chips:
+        left = right - text_width(words, plan.font) - 2 * pad
+        if left >= taken + pad:
+            canvas.box(left, y - pad // 2, right, y + plan.line - pad // 2, ground)
+            canvas.text(left + pad, y, words, plan.font, ink, ground)
+            right = left - pad
 
 
 def figure(value: float) -> str:

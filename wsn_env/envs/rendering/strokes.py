@@ -49,23 +49,14 @@ def draw_discs(
 
 
 @lean_kernel
-def draw_lines(
-    image: np.ndarray,
-    most: Any,
-    clip: Any,
-    starts: np.ndarray,
-    ends: np.ndarray,
-    widths: np.ndarray,
-    opacities: np.ndarray,
-    colour: Any,
-) -> None:
+def draw_lines(image: np.ndarray, most: Any, clip: Any, lines: Any, colour: Any) -> None:
     """Lines with round ends.
 
     Args:
-        starts, ends: (N, 2).
-        widths, opacities: (N,).
+        lines: their starts and ends, (N, 2) each, their widths and opacities, (N,) each.
         colour: (3,).
     """
+    starts, ends, widths, opacities = lines
     for drawing in range(2):  # first gather, then draw
         for k in range(len(starts)):
             x0, y0, x1, y1 = starts[k, 0], starts[k, 1], ends[k, 0], ends[k, 1]

@@ -13,20 +13,17 @@ from wsn_env.compiled import draws
 from wsn_env.compiled.arrays import record
 from wsn_env.compiled.elementary import HALF_PI, F, cos_turns32, exp, log
 from wsn_env.compiled.kernels import kernel, over_rows, piece
+from wsn_env.models.state import state_at
 
 WAVES = 64  # that make a receiver's static field
 SHORTEST = 1e-3  # correlation lengths: shorter waves are white noise to everything here
 PER_NEPER = 10.0 / math.log(10.0)
 
-BEACON_RECORD = record(
-    [
-        (name, "f8")
-        for name in (
-            "field_db field_m drift_db drift_s main_db main_sd_db fade_share fade_db fade_sd_db loss loss_after_loss"
-            " loss_after_none interval_s floor_m"
-        ).split()
-    ]
-)
+SETTINGS = (
+    "field_db field_m drift_db drift_s main_db main_sd_db fade_share fade_db fade_sd_db loss loss_after_loss"
+    " loss_after_none interval_s floor_m bias_db"
+).split()
+BEACON_RECORD = record([(name, "f8") for name in (*SETTINGS, "period_s")])
 
 
 class Packets:
@@ -34,62 +31,41 @@ class Packets:
 
     def __init__(self, beacon: Any, scenario: Any) -> None:
         self._beacon = np.zeros(1, BEACON_RECORD)
-        for name in BEACON_RECORD.names or ():
+        for name in SETTINGS:
             self._beacon[name] = getattr(beacon, name)
+        self._beacon["period_s"] = scenario.period_s
         self._receivers = beacon.of_nodes(scenario.field.nodes)
         self._receivers[:, 1] *= 0.5 * PER_NEPER
         self._recorded = scenario.motion.recorded_packets(scenario)
-        self._numbers = scenario.period_s, beacon.bias_db**2
 
     def fill(self, rows: np.ndarray, state: Any, threads: int) -> None:
         """Begin episodes in the rows marked (B,)."""
-        own = self._beacon, self._receivers, self._recorded, *self._numbers
-        belief = state.belief
-        arrays = state.key, state.track, state.network.positions, state.packets, belief.receivers, belief.biases
-        over_rows(_fill, len(rows), threads, *own, rows, *arrays)
+        own = self._beacon, self._receivers, self._recorded
+        over_rows(_fill, len(rows), threads, *own, rows, state.handle)
 
 
 @kernel
-def _fill(
-    start,
-    stop,
-    beacons,
-    receivers,
-    recorded,
-    period_s,
-    bias_variance,
-    rows,
-    keys,
-    tracks,
-    positions,
-    packets,
-    known,
-    biases,
-):
+def _fill(start, stop, beacons, receivers, recorded, rows, handle):
+    state, c = state_at(handle), beacons[0]
     for b in range(start, stop):
         if not rows[b]:
             continue
         if len(recorded) > 0:
-            packets[b] = recorded
+            state.packets[b] = recorded
         else:
-            draw_packets(keys[b], tracks[b], positions[b], receivers, period_s, beacons[0], packets[b])
+            positions = state.network.positions[b]
+            draw_packets(state.key[b], state.track[b], positions, receivers, c, state.packets[b])
         for j in range(len(receivers)):
-            own = known[b, j]
+            own = state.belief.receivers[b, j]
             own.at_1m_db, own.slope, own.height_m2 = receivers[j, 0], receivers[j, 1], receivers[j, 2]
-            own.bias_variance = bias_variance
+            own.bias_variance = c.bias_db * c.bias_db
             own.latest_db = 0.0
-        biases[b] = np.float32(0.0)
+        state.belief.biases[b] = np.float32(0.0)
 
 
 @piece
 def draw_packets(
-    key: Any,
-    track: np.ndarray,
-    positions: np.ndarray,
-    receivers: np.ndarray,
-    period_s: float,
-    c: Any,
-    packets: np.ndarray,
+    key: Any, track: np.ndarray, positions: np.ndarray, receivers: np.ndarray, c: Any, packets: np.ndarray
 ) -> None:
     """Fill packets (periods + 1, S, 2) with the mean level and the number of those heard about the end of each period.
 
@@ -101,11 +77,11 @@ def draw_packets(
         c: BEACON_RECORD.
     """
     periods = len(track) - 1
-    sent = int((periods + 0.5) * period_s / c.interval_s) + 1
+    sent = int((periods + 0.5) * c.period_s / c.interval_s) + 1
     phase = draws.uniform(draws.stream(key, 0, draws.BEACON_NOISE), 0)
     x, y, when = np.empty(sent, np.float32), np.empty(sent, np.float32), np.empty(sent, np.int64)
     for e in range(sent):
-        place = (e + phase) * c.interval_s / period_s
+        place = (e + phase) * c.interval_s / c.period_s
         k = min(int(place), periods - 1)
         share = min(place - k, 1.0)
         x[e] = track[k, 0] + share * (track[k + 1, 0] - track[k, 0])

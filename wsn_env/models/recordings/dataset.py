@@ -14,59 +14,24 @@ raises `DatasetError`.
 
 from __future__ import annotations
 
-import codecs
-import json
-import math
-import re
-from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from wsn_env.models.quantity import check_quantity
+from wsn_env.models.recordings.lines import FAULTS, read_packets
+from wsn_env.models.recordings.receivers import DEVICES, DatasetError, Receivers, read_file, read_receivers
 
-DEVICES, PARAMETERS = "tetam.dev", "tetam.par"
 ENDINGS = ("_all_sensors.mbd", ".mbd")  # of a track's file, left out of its name
-FIELDS = 16  # in a line
-LEVELS_DB = (-120.0, -20.0)  # a level lies between them
-OUTSIDE_M = 1.0  # the target cannot be farther outside the room
-HEIGHT_M = 5.0  # nor farther above or below the receivers
-FARTHEST_M = 10_000.0  # receivers from the origin
 ASTRAY_S = 60.0  # a longer silence parts a track; its longest part is kept
 GAP_S = 1.0  # a longer silence is counted as a gap: two advertisements that nobody heard
 REPEAT_S = 0.5e-3  # a packet is on air for .4 ms: a receiver cannot hear two within less
 SHORTEST_S = 1.0  # of a track
 FINEST_S = 0.01  # of the periods that a track is cut into
 
-BLANK, MALFORMED = "blank", "malformed"
-RECEIVER, BEACON = "unknown receiver", "another beacon"
-LEVEL, POSITION = "impossible level", "impossible position"
 ASTRAY, REPEATED = "astray time", "repeated packet"
-REASONS = (BLANK, MALFORMED, RECEIVER, BEACON, LEVEL, POSITION, ASTRAY, REPEATED)
-
-SECTION = re.compile(r"\s*(\w+)\s*:(.*)", flags=re.DOTALL)
-
-
-class DatasetError(ValueError):
-    """A file cannot be used; the message names it, the line and what is wrong there."""
-
-
-@dataclass(frozen=True, eq=False)
-class Receivers:
-    """What listens.
-
-    Attributes:
-        names: their ids, in the file's order.
-        positions_m: (S, 3).
-        limits_m: width and depth of the room, whose corner is the origin.
-        beacons: ids of what is tracked; () if nobody knows.
-    """
-
-    names: tuple[str, ...]
-    positions_m: np.ndarray
-    limits_m: tuple[float, float]
-    beacons: tuple[str, ...] = ()
+REASONS = (*FAULTS, ASTRAY, REPEATED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,9 +99,6 @@ class Track:
         return levels[:periods], heard[:periods], positions[:periods]
 
 
-# --- the folder ---------------------------------------------------------------------------------------------
-
-
 def read_dataset(folder: str | Path) -> list[Track]:
     """All tracks of a folder, in the order of their files' names.
 
@@ -163,118 +125,6 @@ def track_files(folder: str | Path) -> list[Path]:
     return files
 
 
-def read_receivers(folder: str | Path) -> Receivers:
-    """The receivers of a folder, and its room.
-
-    The room is as large as tetam.par says; without it, or if it makes no sense (it must begin at the origin and hold
-    the receivers), it reaches from the origin to the farthest receivers.
-
-    Raises:
-        DatasetError: names the file, the line and what is wrong.
-    """
-    path = Path(folder) / DEVICES
-    sections = _sections(path)
-    if "Dongles" not in sections:
-        raise DatasetError(f"{path}: has no line Dongles:{{...}}, which names the receivers")
-    number, text = sections["Dongles"]
-    dongles = _table(path, number, text)
-    if not dongles:
-        raise DatasetError(f"{path}, line {number}: Dongles holds no receiver")
-    positions = np.empty((len(dongles), 3))
-    for place, (name, entry) in enumerate(dongles.items()):
-        position = entry[0] if isinstance(entry, list) and entry else entry
-        if not _are_numbers(position, 3) or max(map(abs, position)) > FARTHEST_M:
-            raise DatasetError(
-                f"{path}, line {number}: receiver {name!r} is at {position!r:.60}: must be [x, y, z] in m, within"
-                f" {FARTHEST_M:g} m"
-            )
-        positions[place] = position
-    limits = _limits(Path(folder) / PARAMETERS, positions)
-    if limits is None:
-        limits = tuple(positions[:, :2].max(axis=0).tolist())
-        if min(limits) <= 0:
-            raise DatasetError(
-                f"{path}, line {number}: from the origin to the receivers there is no room: {PARAMETERS} must give"
-                ' its "limits": [0, 0, width, depth]'
-            )
-    beacons = _table(path, *sections["Beacons"]) if "Beacons" in sections else ()
-    positions.setflags(write=False)
-    return Receivers(tuple(dongles), positions, limits, tuple(beacons))
-
-
-def _sections(path: Path) -> dict[str, tuple[int, str]]:
-    """Line and text of every NAME:{...}, which may go on in further lines."""
-    texts: dict[str, tuple[int, list[str]]] = {}
-    name = None
-    for number, raw in enumerate(_read(path).splitlines(), 1):
-        line = raw.decode(errors="replace")
-        if found := SECTION.fullmatch(line):
-            name, rest = found.groups()
-            if name in texts:
-                raise DatasetError(f"{path}, line {number}: {name} is there twice, first in line {texts[name][0]}")
-            texts[name] = number, [rest]
-        elif name is not None:
-            texts[name][1].append(line)
-        elif line.strip():
-            raise DatasetError(f'{path}, line {number}: must be Dongles:{{"receiver": [[x, y, z], ...], ...}}')
-    return {name: (number, "\n".join(lines)) for name, (number, lines) in texts.items()}
-
-
-def _table(path: Path, number: int, text: str) -> dict:
-    """A JSON table that begins in this line."""
-    try:
-        table = json.loads(text, object_pairs_hook=_distinct)
-        if not isinstance(table, dict):
-            raise ValueError("must be a table {...}")
-    except json.JSONDecodeError as problem:
-        line = number + problem.lineno - 1
-        raise DatasetError(f"{path}, line {line}: {problem.msg} (character {problem.colno} of the table)") from None
-    except (ValueError, RecursionError) as problem:
-        raise DatasetError(f"{path}, line {number}: {problem}") from None
-    return table
-
-
-def _distinct(pairs: list[tuple[str, object]]) -> dict:
-    table = dict(pairs)
-    if len(table) < len(pairs):
-        twice = next(name for name, times in Counter(name for name, _ in pairs).items() if times > 1)
-        raise ValueError(f"{twice!r} is there twice")
-    return table
-
-
-def _limits(path: Path, positions: np.ndarray) -> tuple[float, float] | None:
-    """Width and depth of the room, if the file gives some that can be right."""
-    try:
-        limits = json.loads(path.read_bytes())["limits"]
-    except (OSError, ValueError, TypeError, LookupError, RecursionError):
-        return None
-    if not _are_numbers(limits, 4) or limits[0] != 0 or limits[1] != 0:
-        return None
-    far = np.array(limits[2:], float)
-    fits = (far > 0).all() and (far <= FARTHEST_M).all() and (positions[:, :2] <= far + OUTSIDE_M).all()
-    return tuple(far.tolist()) if fits else None
-
-
-def _are_numbers(values, count: int) -> bool:
-    """A list of so many numbers, all finite and none too large for a float."""
-    return (
-        isinstance(values, list)
-        and len(values) == count
-        and all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
-        and all(abs(value) < 1e300 for value in values)
-    )
-
-
-def _read(path: Path) -> bytes:
-    try:
-        return path.read_bytes().removeprefix(codecs.BOM_UTF8)
-    except (OSError, ValueError) as problem:
-        raise DatasetError(f"{path}: cannot be read: {getattr(problem, 'strerror', None) or problem}") from None
-
-
-# --- a track ------------------------------------------------------------------------------------------------
-
-
 def read_track(path: str | Path, receivers: Receivers | None = None) -> Track:
     """A track, in the order of time, without the lines that cannot be used.
 
@@ -288,9 +138,9 @@ def read_track(path: str | Path, receivers: Receivers | None = None) -> Track:
         DatasetError: names the file, the line and what is wrong; no line can be used, or less than `SHORTEST_S`.
     """
     path = Path(path)
-    lines = _read(path).splitlines()
+    lines = read_file(path).splitlines()
     receivers = read_receivers(path.parent) if receivers is None else receivers
-    packets, places, faults = _packets(lines, receivers)
+    packets, places, faults = read_packets(lines, receivers)
     counts = {"lines": len(lines), "kept": len(packets)} | dict.fromkeys(REASONS, 0)
     for _, reason, _ in faults:
         counts[reason] += 1
@@ -325,88 +175,6 @@ def track_name(path: Path) -> str:
     """What a track's file is called, without its endings."""
     ending = next((ending for ending in ENDINGS if path.name.endswith(ending)), "")
     return path.name.removesuffix(ending)
-
-
-def _packets(lines: list[bytes], receivers: Receivers) -> tuple[np.ndarray, np.ndarray, list[tuple[int, str, str]]]:
-    """Lines, each by itself.
-
-    Returns: (N, 5) time, level, x, y, z; (N,) receivers' places; (line number, reason, why) of the others, by number.
-    """
-    known = {name.encode(errors="replace"): place for place, name in enumerate(receivers.names)}
-    packets, faults = [], []
-    for number, line in enumerate(lines, 1):
-        try:
-            time, receiver, beacon, level, x, y, z = _parse(line)
-        except ValueError as problem:
-            blank = not line.strip()
-            faults.append((number, BLANK if blank else MALFORMED, "holds nothing" if blank else str(problem)))
-            continue
-        if receiver in known:
-            packets.append((number, beacon, known[receiver], time, level, x, y, z))
-        else:
-            faults.append((number, RECEIVER, f"{_shown(receiver)} is not in {DEVICES}"))
-
-    beacon = _tracked([packet[1] for packet in packets], receivers)
-    width, depth = receivers.limits_m
-    low, high = receivers.positions_m[:, 2].min() - HEIGHT_M, receivers.positions_m[:, 2].max() + HEIGHT_M
-    good = []
-    for packet in packets:
-        number, own, _, _, level, x, y, z = packet
-        if own != beacon:
-            named = f"those of {DEVICES}: {', '.join(receivers.beacons)}" if receivers.beacons else _shown(beacon)
-            faults.append((number, BEACON, f"{_shown(own)}, not {named}"))
-        elif not LEVELS_DB[0] < level < LEVELS_DB[1]:
-            faults.append((number, LEVEL, f"{level:g} dBm is not between {LEVELS_DB[0]:g} and {LEVELS_DB[1]:g}"))
-        elif not (-OUTSIDE_M <= x <= width + OUTSIDE_M and -OUTSIDE_M <= y <= depth + OUTSIDE_M and low <= z <= high):
-            room = f"the room of {width:g} x {depth:g} m, or {HEIGHT_M:g} m above or below the receivers"
-            faults.append((number, POSITION, f"({x:g}, {y:g}, {z:g}) m is outside {room}"))
-        else:
-            good.append(packet[2:])
-    faults.sort()
-    table = np.array(good, float).reshape(-1, 6)
-    return table[:, 1:], table[:, 0].astype(np.int64), faults
-
-
-def _parse(line: bytes) -> tuple[float, bytes, bytes, float, float, float, float]:
-    """Time, receiver, beacon, level, x, y, z of a line.
-
-    Raises:
-        ValueError: what is wrong with it.
-    """
-    fields = line.split(b",")
-    if len(fields) != FIELDS:
-        raise ValueError(f"{len(fields)} fields instead of {FIELDS}")
-    try:
-        time, level, *rest = map(float, (fields[0], *fields[3:]))
-    except ValueError:
-        wrong = next(field for field in (fields[0], *fields[3:]) if not _is_number(field))
-        raise ValueError(f"{_shown(wrong)} is not a number") from None
-    if not math.isfinite(time + level + sum(rest)):
-        raise ValueError("its numbers are not all finite")
-    if b"_" in line and any(b"_" in field for field in (fields[0], *fields[3:])):
-        raise ValueError("an underscore in a number")
-    x, y, z = rest[:3]
-    return time, fields[1].strip(), fields[2].strip(), level, x, y, z
-
-
-def _is_number(field: bytes) -> bool:
-    try:
-        float(field)
-    except ValueError:
-        return False
-    return True
-
-
-def _shown(field: bytes) -> str:
-    """In a message: on one line, not too long."""
-    return repr(field[:40].decode(errors="replace"))
-
-
-def _tracked(beacons: list[bytes], receivers: Receivers) -> bytes:
-    """The most frequent of those that may be tracked; b"" if there is none."""
-    named = {name.encode(errors="replace") for name in receivers.beacons}
-    times = Counter(beacon for beacon in beacons if not named or beacon in named)
-    return min(times, key=lambda beacon: (-times[beacon], beacon), default=b"")
 
 
 def _longest_run(time: np.ndarray) -> np.ndarray:

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from wsn_env.models.quantity import ScenarioError
-from wsn_env.models.recordings.dataset import DEVICES, PARAMETERS, DatasetError, Track, read_track
+from wsn_env.models.recordings.dataset import Track, read_track
+from wsn_env.models.recordings.receivers import DEVICES, PARAMETERS, DatasetError
 
 CELL_M = 0.25  # of a residual map
 CALIBRATED = (  # quantities of a calibration, all of them
