@@ -1,7 +1,8 @@
 """Sphinx: `make docs` builds the site with warnings as errors.
 
 Sphinx, MyST and furo, because they are kept, read the Markdown that is here, and make an API reference of docstrings.
-Pictures of scenarios and policies are made anew in every build (`docs/pictures.py`), so that they show what is.
+Pictures of scenarios and policies (`docs/pictures.py`) and the scenarios' pages (`docs/scenarios.py`) are made anew in
+every build, so that they show what is.
 """
 
 import re
@@ -16,6 +17,7 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 
 import pictures  # noqa: E402
+import scenarios  # noqa: E402
 
 from wsn_env import Scenario, __version__  # noqa: E402
 
@@ -25,7 +27,7 @@ myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 3
 html_theme, html_title = "furo", "wsn_env"
 html_static_path = []
-exclude_patterns = ["conf.py", "pictures.py"]
+exclude_patterns = ["conf.py", "pictures.py", "scenarios.py"]
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 nitpicky = False
@@ -96,3 +98,4 @@ def setup(app):
     app.add_directive("quantities", Quantities)
     app.connect("autodoc-process-docstring", markdown_to_rest, priority=100)
     pictures.draw_all(HERE / "_generated")
+    scenarios.write_pages(HERE / "_generated" / "scenarios")

@@ -14,6 +14,7 @@ from wsn_env.evaluation.progress import Progress
 if TYPE_CHECKING:
     from wsn_env.envs.observations import ObservationName
     from wsn_env.models.measurement.base import Order
+    from wsn_env.scenario import Scenario
 
 
 class Job(NamedTuple):
@@ -24,6 +25,7 @@ class Job(NamedTuple):
     fast: bool = False
 
 
+SMALL: dict[str, Any] = {"particles": 20, "periods": 4}
 JOBS = (  # the longest first
     Job("PreDC-v0", ("ekf", "ukf"), fast=True),
     Job("Rssi-v0", ("ekf", "ukf", "ickf", "nonlinear_ls")),
@@ -55,35 +57,67 @@ def compile_everything(progress: Progress | None = None) -> int:
 
 
 def compile_job(job: Job) -> int:
-    """Play what a job names; returns how many kernels were compiled for it."""
-    from wsn_env.envs.env import ClusterEnv
-    from wsn_env.evaluation.policies import make_policy, policy_names
-    from wsn_env.evaluation.rollout import episodes, rollout
-    from wsn_env.scenario import Scenario
-    from wsn_env.simulation.view import View
-    from wsn_env.simulation.world import World
+    """Play what a job names; returns how many kernels were compiled for it.
 
+    All jobs but the first begin at the other end: what they share is there when they get to it.
+    """
     before = len(store.compiled)
-    small: dict[str, Any] = {"particles": 20, "periods": 4}
+    parts = _step_environments, _roll_out, _act, _track
+    for play in parts if job == JOBS[0] else reversed(parts):
+        play(job)
+    return len(store.compiled) - before
+
+
+def _step_environments(job: Job) -> None:
+    from wsn_env.envs.env import ClusterEnv
+
     spoken: tuple[tuple[Order, ObservationName], ...] = (("nearest", "candidates"), ("information", "menu"))
     for order, observation in spoken:
         for fast in (False, True) if job.fast else (False,):
             pictures: dict[str, Any] = {"render_mode": "rgb_array", "frame_px": 64}
-            env = ClusterEnv(job.scenario, order=order, observation=observation, fast=fast, **pictures, **small)
+            env = ClusterEnv(job.scenario, order=order, observation=observation, fast=fast, **pictures, **SMALL)
             env.reset(seed=0)
             env.step(10)
             env.render()
-    scenario = Scenario.named(job.scenario, **small)
+
+
+def _roll_out(job: Job) -> None:
+    from wsn_env.evaluation.policies import make_policy
+    from wsn_env.evaluation.rollout import episodes, rollout
+    from wsn_env.simulation.view import View
+    from wsn_env.simulation.world import World
+
+    scenario = _scenario_of(job)
     looking = scenario if scenario.measurement.lasting_errors else scenario.override(start="search")
     for state, _ in episodes(make_policy("nearest2", looking), World(looking), [0]):
         View.from_arrays(View.of(state).as_arrays())
     rollout(make_policy("nearest2", scenario), World(scenario), [0])  # with its bound
+
+
+def _act(job: Job) -> None:
+    from wsn_env.evaluation.policies import make_policy, policy_names
+    from wsn_env.simulation.view import View
+    from wsn_env.simulation.world import World
+
+    scenario = _scenario_of(job)
     for name in policy_names():
         with suppress(ValueError):  # no network for this scenario, or a planner that cannot plan in it
             make_policy(name, scenario).act(View.of(World(scenario).reset([0])))
+
+
+def _track(job: Job) -> None:
+    from wsn_env.evaluation.policies import make_policy
+    from wsn_env.evaluation.rollout import episodes
+    from wsn_env.simulation.world import World
+
     for tracker in job.trackers:
         kept: dict[str, Any] = {"silent_information": False, "resampling": "systematic"}
-        other = scenario.override(tracker=tracker, **kept)
-        for _ in episodes(make_policy("nearest2", other), World(other), [0]):
+        scenario = _scenario_of(job).override(tracker=tracker, **kept)
+        for _ in episodes(make_policy("nearest2", scenario), World(scenario), [0]):
             pass
-    return len(store.compiled) - before
+
+
+def _scenario_of(job: Job) -> Scenario:
+    from wsn_env.scenario import Scenario
+
+    return Scenario.named(job.scenario, **SMALL)

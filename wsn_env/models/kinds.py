@@ -8,6 +8,7 @@ found again on disk while their code is the same, and never runs with a kind tha
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cache, partial
@@ -89,10 +90,10 @@ def _number_type(value) -> str:
 
 @cache
 def _code_stamp(kind: type[Kind]) -> str:
-    own = {name: getattr(kind, name, None) for name in (*kind.required, *kind.optional)}
-    named = {name: plain_function(function) for name, function in own.items()}
-    found = {name: function for name, function in sorted(named.items()) if function is not None}
-    return stamp(*found.values(), more=[(name, f.__module__, f.__qualname__) for name, f in found.items()])
+    own: dict[str, Any] = {name: inspect.getattr_static(kind, name, None) for name in (*kind.required, *kind.optional)}
+    compiled = {name: plain_function(each) for name, each in sorted(own.items()) if isinstance(each, staticmethod)}
+    named = [(name, each.__module__, each.__qualname__) for name, each in compiled.items() if each is not None]
+    return stamp(*compiled.values(), more=[kind.allocates, *named])
 
 
 def by_kind(function: Callable[..., Any]) -> Any:

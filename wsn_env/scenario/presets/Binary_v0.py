@@ -1,4 +1,10 @@
-"""Binary sensors and a sink (Zhou, Cheng & Xing, 2009)."""
+"""Binary sensors and a sink (Zhou, Cheng & Xing, 2009).
+
+600 nodes in 500 m x 500 m know one bit each: whether the target is within 60 m. An awake node reports to a sink in the
+middle of the field when its bit has changed since it last sensed; silence tells, too. Episodes last 50 periods.
+
+What matters: the nodes that tell most stand on the edge of the disc about the target, not near it.
+"""
 
 from wsn_env.models.detection.radius import Detection
 from wsn_env.models.field import Field

@@ -1,4 +1,12 @@
-"""Underwater tracking by the strongest signal (patent CN103152791)."""
+"""Underwater tracking by the strongest signal (patent CN103152791).
+
+64 nodes stand in a jittered grid of 1 km x 1 km; periods last 5 s. A node detects when the level that it hears exceeds
+85 dB, and reports that level over an acoustic modem with a range of 250 m. Sleeping costs energy, too. The filter
+(1,000 particles) also weighs who kept silent.
+
+What matters: a report costs a thousand times what it does on land, so lam is a thousand times smaller; members must be
+within one hop of the head.
+"""
 
 from wsn_env.models.detection.threshold import Threshold
 from wsn_env.models.field import Field
