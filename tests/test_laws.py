@@ -103,7 +103,7 @@ def test_what_happens_does_not_depend_on_the_choice(scenario, seed):
         everybody, whole = world.step(everybody, awake)
         np.testing.assert_array_equal(state.track, everybody.track)
         np.testing.assert_array_equal(outcome.target_m, whole.target_m)
-        np.testing.assert_array_equal(state.row["luck"], everybody.row["luck"])
+        np.testing.assert_array_equal(state.row["random_bits"], everybody.row["random_bits"])
         np.testing.assert_array_equal(state.row["lam"], everybody.row["lam"])
         np.testing.assert_array_equal(state.network.positions, everybody.network.positions)
         for row in range(4):

@@ -44,7 +44,7 @@ STATE = record(
         ("lam", "f8"),  # m/mJ
         ("log_miss", "f8"),  # log probability of having missed the target ever since the last report
         ("last_search", "i8"),  # period of the last search
-        ("luck", "u4"),  # a random number of the period, for policies that want one
+        ("random_bits", "u4"),  # a random 32-bit number of the period, for policies that want one
     ]
 )
 
