@@ -118,7 +118,7 @@ class ClusterEnv(gym.Env):
             if self._bound is not None:
                 info["episode_bound_m"] = self._bound.episode_m().item()
                 if self._bound.kind == "bound":
-                    info["episode_floor_m"] = self._bound.floor_m(self._state).item()
+                    info["episode_bound_all_awake_m"] = self._bound.bound_all_awake_m(self._state).item()
         return self._observe(), reward, False, truncated, info
 
     def _judge(self, outcome: Outcome) -> tuple[float | np.ndarray, dict[str, Any]]:

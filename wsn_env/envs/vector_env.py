@@ -180,7 +180,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         if self._bound is not None:
             info["episode_bound_m"] = self._bound.episode_m()
             if self._bound.kind == "bound":
-                info["episode_floor_m"] = self._bound.floor_m(self._state, rows)
+                info["episode_bound_all_awake_m"] = self._bound.bound_all_awake_m(self._state, rows)
         return info
 
     def _same_step(

@@ -31,7 +31,7 @@ from wsn_env.simulation.bound import bound_kind
 
 COLUMNS = (
     "policy scenario lam episode seed periods return error_m rms_m energy_mj members handovers searches lost"
-    " bound_m floor_m anees"
+    " bound_m bound_all_awake_m anees"
 ).split()
 Row = dict[str, str | float]  # of the columns in COLUMNS
 MEANS = ("return", "rms_m", "error_m", "energy_mj", "members", "handovers", "searches", "lost")
@@ -81,7 +81,7 @@ class Evaluation:
         """Root mean square of the bound with all nodes awake, the same for every policy; None: there is no bound."""
         if bound_kind(self.scenario) == "none":
             return None
-        return float(np.sqrt(np.mean(self.values(self.policies[0], self.lams[0], "floor_m") ** 2)))
+        return float(np.sqrt(np.mean(self.values(self.policies[0], self.lams[0], "bound_all_awake_m") ** 2)))
 
     def difference(self, policy: str, reference: str, lam: float, column: str = "return") -> Summary:
         """Paired difference policy - reference over the common episodes."""
@@ -137,7 +137,7 @@ class Evaluation:
         ratio = self.rms_over_bound(policy, lam)
         if ratio is None:
             return {}
-        return {f"rms_over_{bound_kind(self.scenario)}": vars(ratio), "floor_m": self.bound_all_awake_m()}
+        return {f"rms_over_{bound_kind(self.scenario)}": vars(ratio), "bound_all_awake_m": self.bound_all_awake_m()}
 
     def settings(self) -> dict[str, Any]:
         """What was asked for."""

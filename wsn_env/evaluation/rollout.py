@@ -103,7 +103,7 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
         "searches": sums["searches"].astype(int),
         "lost": sums["lost"].astype(int),
         "bound_m": np.full(len(seeds), "") if bound is None else bound.episode_m(),
-        "floor_m": np.full(len(seeds), "") if bound is None else bound.floor_m(state),
+        "bound_all_awake_m": np.full(len(seeds), "") if bound is None else bound.bound_all_awake_m(state),
         "anees": ratios / np.maximum(judged, 1),
     }
     return [{name: values[i].item() for name, values in columns.items()} for i in range(len(seeds))]

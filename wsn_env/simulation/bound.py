@@ -7,8 +7,8 @@ The recursion of Tichavsky, Muravchik & Nehorai (1998, eq. 21) for the constant 
 with H at the true state. It runs on P = J^-1, since G G' is singular. P0 is the first belief's covariance, and q the
 target's own acceleration noise, not the filter's.
 
-The *floor* is the same for a network in which every node is awake throughout and every report arrives. It depends on
-field, track and key alone, so that it is one number an episode, whatever the schedule.
+The *bound with all nodes awake* is the same for a network in which every node is awake throughout and every report
+arrives. It depends on field, track and key alone, so that it is one number an episode, whatever the schedule.
 
 Both are made of the truth: for loggers and tables, never for policies.
 """
@@ -69,7 +69,7 @@ def process_noise(scenario: Scenario) -> float:
 class Bound:
     """The bounds of B rows, a period after the other.
 
-    `begin` at the start of an episode, then `advance` once a period; `episode_m` and `floor_m` at its end.
+    `begin` at the start of an episode, then `advance` once a period; `episode_m` and `bound_all_awake_m` at its end.
     """
 
     def __init__(self, scenario: Scenario, rows: int = 1, threads: int = 1) -> None:
@@ -125,8 +125,8 @@ class Bound:
         """(B,) root of the mean square over the horizon of what `advance` has returned [m]."""
         return np.sqrt(self._memory["squares"] / self._periods)
 
-    def floor_m(self, state: State, rows: np.ndarray | None = None) -> np.ndarray:
-        """What all nodes would have told, awake throughout: the root of the mean square over the horizon [m].
+    def bound_all_awake_m(self, state: State, rows: np.ndarray | None = None) -> np.ndarray:
+        """The bound with all nodes awake throughout: the root of the mean square over the horizon [m].
 
         Args:
             state: in any period of the episode.
@@ -135,10 +135,10 @@ class Bound:
         Returns: (B,), 0 in other rows.
         """
         rows = np.ones(state.rows, bool) if rows is None else np.asarray(rows, bool)
-        floor_m, memory = np.zeros(len(rows)), np.zeros(len(rows), MEMORY)
-        arguments = self._constants, self._start, self._asked_first, rows, state.handle, memory, floor_m
-        over_rows(_floors, len(rows), threads_for(rows, self._threads), *arguments)
-        return floor_m
+        bound_all_awake_m, memory = np.zeros(len(rows)), np.zeros(len(rows), MEMORY)
+        arguments = self._constants, self._start, self._asked_first, rows, state.handle, memory, bound_all_awake_m
+        over_rows(_bound_all_awake, len(rows), threads_for(rows, self._threads), *arguments)
+        return bound_all_awake_m
 
 
 @lean_kernel
@@ -165,7 +165,7 @@ def _advance(start, stop, cs, outcomes, handle, memory, bound_m):
 
 
 @lean_kernel
-def _floors(start, stop, cs, starts, asked_first, rows, handle, memory, floor_m):
+def _bound_all_awake(start, stop, cs, starts, asked_first, rows, handle, memory, bound_all_awake_m):
     state, c = state_at(handle), cs[0]
     for b in range(start, stop):
         if not rows[b]:
@@ -178,7 +178,7 @@ def _floors(start, stop, cs, starts, asked_first, rows, handle, memory, floor_m)
         for k in range(1, periods + 1):
             xx, xy, yy = _information_of_all(state, b, k, c)
             _take_period(own, xx, xy, yy, c)
-        floor_m[b] = np.sqrt(own.squares / periods)
+        bound_all_awake_m[b] = np.sqrt(own.squares / periods)
 
 
 @lean_piece
