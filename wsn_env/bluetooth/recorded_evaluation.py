@@ -61,7 +61,7 @@ class RecordedEvaluation:
         members = [policy for policy in self.first.policies if policy != stem and stem_of(policy) == stem]
         return sorted(members, key=lambda policy: self.mean(policy, lam, "energy_mj"))
 
-    def at_energy(self, stem: str, lam: float, energy_mj: float) -> float | None:
+    def rms_at_energy_m(self, stem: str, lam: float, energy_mj: float) -> float | None:
         """RMS of a family at an energy, on straight lines between its members [m]; None: beyond them."""
         members = self.family(stem, lam)
         energies = [self.mean(policy, lam, "energy_mj") for policy in members]
