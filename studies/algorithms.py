@@ -123,13 +123,15 @@ def one(study: Study, scenario: Scenario, name: str, seed: int) -> dict[float, n
     if not path.exists():
         maker, action = ALGORITHMS[name]
         span = scenario.override(lam=scenario.lam_span)
-        speaks = dict(action=action, observation="menu", order=default_order(scenario))
-        envs = ClusterVectorEnv(ROWS, span, reward="belief", autoreset_mode="Disabled", **speaks)
+        interface = dict(action=action, observation="menu", order=default_order(scenario))
+        envs = ClusterVectorEnv(ROWS, span, reward="belief", autoreset_mode="Disabled", **interface)
         model = maker(SB3VecEnv(TrainingReward(envs, calibrated=True), stagger=True), seed=10**6 * seed, device="cpu")
         started = time.perf_counter()
         model.learn(study.steps)
         seconds = time.perf_counter() - started
-        returns = {lam: play(model, scenario.override(lam=lam), speaks, study.episodes) for lam in scenario.lam_octaves}
+        returns = {
+            lam: play(model, scenario.override(lam=lam), interface, study.episodes) for lam in scenario.lam_octaves
+        }
         print(
             f"{name}, seed {seed}: {seconds:.0f} s",
             {lam: round(float(values.mean()), 1) for lam, values in returns.items()},
@@ -140,9 +142,9 @@ def one(study: Study, scenario: Scenario, name: str, seed: int) -> dict[float, n
     return {float(lam): np.array(values) for lam, values in kept.items() if lam != "seconds"}
 
 
-def play(model, scenario: Scenario, speaks: dict, episodes: int) -> np.ndarray:
+def play(model, scenario: Scenario, interface: dict, episodes: int) -> np.ndarray:
     """Returns (episodes,) of the model's likeliest actions on the held-out episodes, by the true error."""
-    envs = ClusterVectorEnv(episodes, scenario, autoreset_mode="Disabled", **speaks)
+    envs = ClusterVectorEnv(episodes, scenario, autoreset_mode="Disabled", **interface)
     masked = type(model).__name__ == "MaskablePPO"
     memory, first = None, np.ones(episodes, bool)
 

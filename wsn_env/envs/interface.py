@@ -15,7 +15,7 @@ from wsn_env.scenario import Scenario
 
 @dataclass(frozen=True)
 class Settings:
-    """How an environment speaks, whatever the scenario."""
+    """An environment's actions, observations and rewards, whatever the scenario."""
 
     action: ActionName = "menu"
     observation: ObservationName = "candidates"

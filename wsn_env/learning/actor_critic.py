@@ -10,7 +10,7 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.type_aliases import Schedule
 from torch import nn
 
-from wsn_env.learning.network import EntryNetwork, FlatNetwork, Network
+from wsn_env.learning.network import EntryNetwork, FlatNetwork, PolicyNetwork
 
 
 class EntryActorCritic(nn.Module):
@@ -69,7 +69,7 @@ class EntryActorCritic(nn.Module):
         """(B, 1)."""
         return self.critic(observation)
 
-    def network(self) -> EntryNetwork:
+    def actor_network(self) -> EntryNetwork:
         """The actor as NumPy arrays."""
         parts = {"belief": self.belief, "entry": self.entry, "hidden": self.hidden, "score": self.score}
         arrays = {}
@@ -100,11 +100,11 @@ class EntryPolicy(ActorCriticPolicy):
         return super()._get_constructor_parameters() | {"entries": self.entries}
 
 
-def network_of(model: PPO) -> Network:
+def actor_network(model: PPO) -> PolicyNetwork:
     """The actor of a stable-baselines3 PPO model: an EntryPolicy's, or one with two tanh layers."""
     policy = model.policy
     if isinstance(policy, EntryPolicy):
-        return policy.mlp_extractor.network()
+        return policy.mlp_extractor.actor_network()
     layers = [*policy.mlp_extractor.policy_net, policy.action_net]
     linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
     arrays = {}
