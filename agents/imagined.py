@@ -172,8 +172,8 @@ def _correct(mean, cov, hx, hy, innovation, r):
             cov[i, k] -= ph[i] * ph[k] / s
 
 
-def rows_of(value: Any, rows: Any) -> Any:
+def take_rows(value: Any, rows: Any) -> Any:
     """Some rows of a View or of a record of arrays: a slice, or their numbers."""
     if isinstance(value, View):
-        return View(rows_of(value.knowledge, rows))
+        return View(take_rows(value.knowledge, rows))
     return value.map(lambda array: array[rows])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wsn_env.agents.base import ViewPolicy
-from wsn_env.agents.strongest import first_of
+from wsn_env.agents.strongest import highest_scoring
 from wsn_env.compiled.draws import uniforms
 from wsn_env.models.quantity import check_quantity
 from wsn_env.models.state import Cluster
@@ -29,7 +29,7 @@ class Random(ViewPolicy):
     def act(self, view: View) -> Cluster:
         """Throw the dice, for every row."""
         if self.n is not None:
-            return first_of(uniforms(view.random_bits, view.alive.shape[1]), view, self.n)
+            return highest_scoring(uniforms(view.random_bits, view.alive.shape[1]), view, self.n)
         able = self.detection(view) > 0
         nodes = able.shape[1]
         u = uniforms(view.random_bits, 2 * nodes)
