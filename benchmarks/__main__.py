@@ -25,7 +25,7 @@ CLAIMS = (
 def main() -> int:
     """Run, report, renew the page. Returns the exit code: 1 if a claim's process failed, not if a target is missed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rounds", type=int, help="turns of each contestant")
+    parser.add_argument("--rounds", type=int, help="turns of each implementation")
     parser.add_argument("--short", action="store_true", help="a glance; leaves docs/performance.md as it is")
     parser.add_argument("--folder", type=Path, help="where to put the results (a glance's are not kept)")
     arguments = parser.parse_args()

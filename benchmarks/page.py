@@ -3,7 +3,7 @@
     python -m benchmarks.page [FOLDER]
 
 Markers are `<!-- begin NAME -->` and `<!-- end NAME -->`: `machine`, `targets`, one for any claim by its name,
-`further` for the claims without their own, and `plots` for those with every contestant.
+`further` for the claims without their own, and `plots` for those with every implementation.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ ORDER = (
     *("filter_step", "environment", "vector", "overhead", "training", "rllib", "filter_scaling", "nodes", "memory"),
     *("recording", "frames"),
 )
-EVERY_CONTESTANT = ("particles", "rows")  # plots that stand together, at the end
+EVERY_IMPLEMENTATION = ("particles", "rows")  # plots that stand together, at the end
 ENVIRONMENTS = "env_rows"  # joins the second of them
 WIDTH = 128
 MARKED = re.compile(r"(<!-- begin (\w+) -->\n).*?(<!-- end \2 -->)", flags=re.DOTALL)
@@ -63,7 +63,7 @@ def rendered(text: str, results: list[Result]) -> str:
     blocks = {"machine": machine(results), "targets": targets(results)}
     blocks |= {result.name: section(result, heading=False) for result in results}
     drawn = plots(results)
-    blocks["plots"] = "\n".join(_image(drawn[name]) for name in EVERY_CONTESTANT if name in drawn)
+    blocks["plots"] = "\n".join(_image(drawn[name]) for name in EVERY_IMPLEMENTATION if name in drawn)
     blocks["further"] = "\n".join(section(result) for result in results if result.name not in own)
     if "further" not in own and blocks["further"]:
         raise SystemExit(f"{PAGE.name} has no place for further claims: add <!-- begin further --> and its end")
@@ -132,7 +132,7 @@ def section(result: Result, heading: bool = True) -> str:
     if result.skipped:
         names = "; ".join(f"{name} ({reason})" for name, reason in result.skipped.items())
         parts.append(_wrapped(f"Skipped: {names}."))
-    elsewhere = (*EVERY_CONTESTANT, ENVIRONMENTS)
+    elsewhere = (*EVERY_IMPLEMENTATION, ENVIRONMENTS)
     parts += [_image(plot) for plot in result.plots if plot.name not in elsewhere]
     return "\n".join(parts)
 

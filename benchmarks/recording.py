@@ -2,8 +2,8 @@
 
     python -m benchmarks.recording [--rounds N] [--short] [--json FILE]
 
-The contestants split lines and make numbers of the fields that are needed; the loader also judges every line, sorts the
-packets, and counts what it leaves out.
+The implementations split lines and make numbers of the fields that are needed; the loader also judges every line, sorts
+the packets, and counts what it leaves out.
 """
 
 import csv
@@ -51,8 +51,8 @@ def measure(options: Options, console: Console) -> Result:
     return Result(
         name="recording",
         title="Reading a recorded track",
-        text=f"A synthetic Bluetooth track of {kilobytes:.0f} kB in the published format. The contestants make numbers"
-        " of the fields needed and look at nothing else.",
+        text=f"A synthetic Bluetooth track of {kilobytes:.0f} kB in the published format. The implementations make"
+        " numbers of the fields needed and look at nothing else.",
         claims=[
             Claim("reading a recorded track", AT_MOST_S, times.median("read_track"), unit="s", at_most=True),
             Claim("the same over csv and float", 4.0, times.ratio("read_track", "csv and float"), at_most=True),

@@ -89,7 +89,7 @@ def _equal(got, wanted, step: int) -> None:
 
 
 def race(particles: int, rows: int, options: Options) -> Times:
-    """Seconds a step of a row, by contestant."""
+    """Seconds a step of a row, by implementation."""
     calls = {name: episode(make(name, rows, particles=particles)) for name in MODES}
     return interleave(calls, options, dict.fromkeys(calls, rows * Scenario.named(ID).periods), warm=not options.short)
 
@@ -109,7 +109,7 @@ def episode(envs: gym.vector.VectorEnv) -> Callable[[], None]:
 
 
 def against_rows(options: Options, console: Console) -> dict[str, list[tuple[float, float]]]:
-    """(B, steps/s) by contestant."""
+    """(B, steps/s) by implementation."""
     threads, periods = available_threads(), Scenario.named(ID).periods
     everybody = f"{NATIVE}, {threads} threads"
     lines: dict[str, list[tuple[float, float]]] = {f"{NATIVE}, 1 thread": [], everybody: [], SYNC: []}

@@ -1,4 +1,4 @@
-"""The contestants compute the same, and their results become a page. (Nothing here looks at a clock.)"""
+"""The implementations compute the same, and their results become a page. (Nothing here looks at a clock.)"""
 
 import subprocess
 import sys
@@ -9,12 +9,21 @@ from rich.console import Console
 
 from benchmarks import __main__ as suite
 from benchmarks import environment, filter_scaling, filter_step, page, plots, race
-from benchmarks.filters import CONTESTANTS, SLOW_STARTERS, Absent, Contestant, Problem, agreement, enter, kind_of
+from benchmarks.filters import (
+    IMPLEMENTATIONS,
+    SLOW_STARTERS,
+    Absent,
+    Implementation,
+    Problem,
+    agreement,
+    enter,
+    kind_of,
+)
 from benchmarks.filters.exact import estimates
 from benchmarks.filters.textbook import ParticleFilter
 
 MEASUREMENTS = ("position", "rssi")
-NAMES = [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW_STARTERS)) for name in CONTESTANTS]
+NAMES = [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW_STARTERS)) for name in IMPLEMENTATIONS]
 
 
 def skipping_absent(function, *arguments, **keywords):
@@ -59,9 +68,9 @@ def test_the_check_is_the_same_every_time():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_contestant_steps_and_starts_over(name):
-    contestant = skipping_absent(enter, name, Problem.draw("position", particles=200, rows=2))
-    means, covs, n_eff = estimates(contestant, periods=22)
+def test_every_implementation_steps_and_starts_over(name):
+    implementation = skipping_absent(enter, name, Problem.draw("position", particles=200, rows=2))
+    means, covs, n_eff = estimates(implementation, periods=22)
     assert means.shape == (22, 2, 4) and covs.shape == (22, 2, 4, 4) and n_eff.shape == (22, 2)
     assert np.isfinite(means).all() and (n_eff > 1).all() and (n_eff <= 200.1).all()
 
@@ -83,8 +92,8 @@ def test_fast_c_leaves_the_process_its_denormals():
     assert np.full(3, 1e-310)[1] * 0.5 > 0.0
 
 
-def test_a_contestant_that_is_not_here_is_skipped_by_name(monkeypatch):
-    monkeypatch.setitem(CONTESTANTS, "nobody", ("nobody", "Nobody"))
+def test_an_implementation_that_is_not_here_is_skipped_by_name(monkeypatch):
+    monkeypatch.setitem(IMPLEMENTATIONS, "nobody", ("nobody", "Nobody"))
     figures, absent = agreement.check(["nobody"], "position")
     assert figures == {} and "nobody" in absent["nobody"]
 
@@ -97,7 +106,7 @@ def test_another_posterior_is_not_raced(monkeypatch):
 
 def test_the_protocol_is_abstract():
     with pytest.raises(NotImplementedError):
-        Contestant(Problem.draw(particles=10))
+        Implementation(Problem.draw(particles=10))
 
 
 # --- the environments ---------------------------------------------------------------------------------------
@@ -110,7 +119,7 @@ def test_the_naive_environment_has_the_same_episodes():
 
 
 def test_every_environment_steps():
-    field, skipped = environment.contestants()
+    field, skipped = environment.implementations()
     assert len(field) + len(skipped) == len(environment.LABELS)
     for call, steps in field.values():
         assert steps in (1, environment.ROWS)
@@ -120,7 +129,7 @@ def test_every_environment_steps():
 # --- the harness --------------------------------------------------------------------------------------------
 
 
-def test_contestants_have_turns_in_every_round():
+def test_implementations_have_turns_in_every_round():
     order, now = [], iter(range(1000))
     calls = {name: lambda name=name: order.append(name) for name in "ab"}
     times = race.interleave(calls, race.Options(rounds=3), {"b": 2}, clock=lambda: next(now), warm=False)
@@ -144,12 +153,12 @@ def test_the_line_is_found():
 
 @pytest.fixture
 def few(monkeypatch):
-    """Claims without the slower contestants."""
+    """Claims without the slower implementations."""
     names = ("wsn_env, strict", "wsn_env, fast", "NumPy f32, tuned")
-    chosen = {name: CONTESTANTS[name] for name in names} | {"nobody": ("nobody", "Nobody")}
-    monkeypatch.setattr(filter_step, "CONTESTANTS", chosen)
+    chosen = {name: IMPLEMENTATIONS[name] for name in names} | {"nobody": ("nobody", "Nobody")}
+    monkeypatch.setattr(filter_step, "IMPLEMENTATIONS", chosen)
     monkeypatch.setattr(filter_scaling, "RACED", list(chosen))
-    monkeypatch.setitem(CONTESTANTS, "nobody", chosen["nobody"])
+    monkeypatch.setitem(IMPLEMENTATIONS, "nobody", chosen["nobody"])
     monkeypatch.setattr(filter_scaling, "SHORT_LIMIT", 8000)
     monkeypatch.setattr(race, "SHORT_TURN_S", 0.0)
 
