@@ -30,7 +30,7 @@ def measure(options: Options, console: Console) -> Result:
     result = Result(name="filter_scaling", title="Scaling of the filter")
     result.skipped = dict.fromkeys(SLOW_STARTERS, "compiles for seconds for every shape")
     grid = kernel_grid(options, console)
-    a, b = fit(grid)
+    a, b = fit_line(grid)
     deviations = {point: 100 * (seconds / (a + b * point[0] * point[1]) - 1) for point, seconds in grid.items()}
     inside = {
         (p, rows): value for (p, rows), value in deviations.items() if p * (BYTES * rows + SCRATCH_BYTES) <= l2_bytes()
@@ -82,7 +82,7 @@ def shared_cloud(particles: int, rows: int) -> Problem:
     return Problem(**problem.__dict__ | parts)
 
 
-def fit(grid: dict[tuple[int, int], float]) -> tuple[float, float]:
+def fit_line(grid: dict[tuple[int, int], float]) -> tuple[float, float]:
     """a, b [s] of the line a + b P B with the least squares of relative deviations."""
     seconds = np.array(list(grid.values()))
     sizes = np.array([p * rows for p, rows in grid])
@@ -95,12 +95,12 @@ def table(grid: dict, deviations: dict) -> Table:
     """Particles down, rows across."""
     lines = []
     for p in PARTICLES:
-        cells = [f"{_time(grid[p, b])} ({deviations[p, b]:+.0f} %)" if (p, b) in grid else "" for b in ROWS]
+        cells = [f"{_format_time(grid[p, b])} ({deviations[p, b]:+.0f} %)" if (p, b) in grid else "" for b in ROWS]
         lines.append([f"{p:,}", *cells])
     return Table("Filter kernel, time of a call", ["particles", *(f"B = {b}" for b in ROWS)], lines)
 
 
-def _time(seconds: float) -> str:
+def _format_time(seconds: float) -> str:
     return f"{1e6 * seconds:.1f} us" if seconds < 1e-3 else f"{1e3 * seconds:.3g} ms"
 
 
@@ -115,8 +115,8 @@ def against_particles(options: Options, console: Console, result: Result) -> Lin
     lines: Lines = {}
     for p in sizes:
         console.print(f"every implementation, {p} particles", style="dim")
-        entered = _entered(RACED, Problem.draw("position", p), result.skipped)
-        _extend(lines, p, interleave({name: each.step for name, each in entered.items()}, _few(options)))
+        entered = _enter_present(RACED, Problem.draw("position", p), result.skipped)
+        _add_points(lines, p, interleave({name: each.step for name, each in entered.items()}, _fewer_rounds(options)))
     return lines
 
 
@@ -127,14 +127,18 @@ def against_rows(options: Options, console: Console) -> Lines:
         console.print(f"every implementation, {rows} rows", style="dim")
         problem = shared_cloud(5000, rows)
         for name in RACED:  # one in memory at a time: with many rows some need gigabytes
-            for implementation in _entered([name], problem, {}).values():
+            for implementation in _enter_present([name], problem, {}).values():
                 once = options.short or rows >= FEW
-                times = _once(name, implementation) if once else interleave({name: implementation.step}, _few(options))
-                _extend(lines, rows, times)
+                times = (
+                    _time_once(name, implementation)
+                    if once
+                    else interleave({name: implementation.step}, _fewer_rounds(options))
+                )
+                _add_points(lines, rows, times)
     return lines
 
 
-def _entered(names: Iterable[str], problem: Problem, skipped: dict[str, str]) -> dict:
+def _enter_present(names: Iterable[str], problem: Problem, skipped: dict[str, str]) -> dict:
     entered = {}
     for name in names:
         try:
@@ -144,17 +148,17 @@ def _entered(names: Iterable[str], problem: Problem, skipped: dict[str, str]) ->
     return entered
 
 
-def _extend(lines: Lines, x: int, times: Times) -> None:
+def _add_points(lines: Lines, x: int, times: Times) -> None:
     for name in times.seconds:
         lines.setdefault(name, []).append((x, times.median(name)))
 
 
-def _few(options: Options) -> Options:
+def _fewer_rounds(options: Options) -> Options:
     """A plot on log axes needs no more."""
     return Options(min(options.rounds, 5), options.short)
 
 
-def _once(name: str, implementation: Implementation) -> Times:
+def _time_once(name: str, implementation: Implementation) -> Times:
     """One step: of many rows it is long enough. Batched ones compile and touch their memory before."""
     if not isinstance(implementation, Looped):
         implementation.step()

@@ -38,7 +38,7 @@ def renew(folder: Path = RESULTS, page: Path = PAGE) -> None:
         raise SystemExit(f"no results in {folder}: run python -m benchmarks")
     for plot in plots(results).values():
         draw(plot, page.with_name(f"performance_{plot.name}.svg"))
-    text = rendered(page.read_text(), results)
+    text = fill_blocks(page.read_text(), results)
     with replacing(page) as temporary:
         temporary.write_text(text)
 
@@ -57,10 +57,10 @@ def plots(results: list[Result]) -> dict[str, Plot]:
     return found
 
 
-def rendered(text: str, results: list[Result]) -> str:
+def fill_blocks(text: str, results: list[Result]) -> str:
     """The page's text with new blocks. Doing it twice changes nothing."""
     own = {name for _, name, _ in MARKED.findall(text)}
-    blocks = {"machine": machine(results), "targets": targets(results)}
+    blocks = {"machine": machine(results), "targets": table_of_targets(results)}
     blocks |= {result.name: section(result, heading=False) for result in results}
     drawn = plots(results)
     blocks["plots"] = "\n".join(_image(drawn[name]) for name in EVERY_IMPLEMENTATION if name in drawn)
@@ -73,30 +73,30 @@ def rendered(text: str, results: list[Result]) -> str:
 def machine(results: list[Result]) -> str:
     """Where the figures come from; the claims of one page should share it."""
     lines = []
-    for facts in _distinct([result.machine for result in results]):
+    for facts in _distinct_machines([result.machine for result in results]):
         packages = ", ".join(f"{name} {number}" for name, number in sorted(facts["packages"].items()))
         text = (
             f"{facts['processor']}, {facts['cores']} cores, {facts['l2_bytes'] // 1024} KiB of L2 cache each,"
             f" {facts['system']}, Python {facts['python']}; {packages}."
         )
-        lines.append(_wrapped(text))
+        lines.append(_wrap_text(text))
     return "\n".join(lines)
 
 
-def _distinct(machines: list[dict]) -> list[dict]:
+def _distinct_machines(machines: list[dict]) -> list[dict]:
     """Machines that differ in more than the packages that a claim names; these joined."""
     distinct: list[dict] = []
     for facts in machines:
-        for known in distinct:
-            if {**known, "packages": 0} == {**facts, "packages": 0}:
-                known["packages"] = known["packages"] | facts["packages"]
+        for joined in distinct:
+            if {**joined, "packages": 0} == {**facts, "packages": 0}:
+                joined["packages"] = joined["packages"] | facts["packages"]
                 break
         else:
             distinct.append(dict(facts))
     return distinct
 
 
-def targets(results: list[Result]) -> str:
+def table_of_targets(results: list[Result]) -> str:
     """All claims in a table: a line for those that differ in their case only, with the worst of them."""
     lines: dict[tuple, list[Claim]] = {}
     for result in results:
@@ -127,11 +127,11 @@ def _line(claims: list[Claim]) -> list[str]:
 def section(result: Result, heading: bool = True) -> str:
     """Text, tables, what was skipped, plots."""
     parts = [f"## {result.title}\n"] if heading else []
-    parts += [_wrapped(result.text)] if result.text else []
+    parts += [_wrap_text(result.text)] if result.text else []
     parts += [f"{table.title}:\n\n{markdown(table)}" for table in result.tables]
     if result.skipped:
         names = "; ".join(f"{name} ({reason})" for name, reason in result.skipped.items())
-        parts.append(_wrapped(f"Skipped: {names}."))
+        parts.append(_wrap_text(f"Skipped: {names}."))
     elsewhere = (*EVERY_IMPLEMENTATION, ENVIRONMENTS)
     parts += [_image(plot) for plot in result.plots if plot.name not in elsewhere]
     return "\n".join(parts)
@@ -141,7 +141,7 @@ def _image(plot: Plot) -> str:
     return f"![{plot.title}](performance_{plot.name}.svg)\n"
 
 
-def _wrapped(text: str) -> str:
+def _wrap_text(text: str) -> str:
     return textwrap.fill(text, WIDTH, break_on_hyphens=False) + "\n"
 
 

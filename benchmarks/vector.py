@@ -75,16 +75,15 @@ def same_bits(particles: int, rows: int = 8, periods: int = 6, steps: int = 20) 
     """
     native, sync = (make(name, rows, particles=particles, periods=periods) for name in MODES)
     rng = np.random.default_rng(0)
-    got, wanted = native.reset(seed=7)[0], sync.reset(seed=7)[0]
-    _equal([got], [wanted], 0)
+    _check_equal([native.reset(seed=7)[0]], [sync.reset(seed=7)[0]], 0)
     for step in range(1, steps + 1):
         actions = rng.integers(native.single_action_space.n, size=rows)
-        _equal(native.step(actions)[:4], sync.step(actions)[:4], step)
+        _check_equal(native.step(actions)[:4], sync.step(actions)[:4], step)
     return steps
 
 
-def _equal(got, wanted, step: int) -> None:
-    if not all(np.array_equal(a, b) for a, b in zip(got, wanted, strict=True)):
+def _check_equal(native, sync, step: int) -> None:
+    if not all(np.array_equal(a, b) for a, b in zip(native, sync, strict=True)):
         raise SystemExit(f"native and SyncVectorEnv differ in step {step}: no race")
 
 

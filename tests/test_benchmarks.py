@@ -148,7 +148,7 @@ def test_the_claims_verdicts():
 def test_the_line_is_found():
     sizes = [(p, rows) for p in (500, 5000) for rows in (10, 100)]
     grid = {(p, rows): 3e-6 + 5e-9 * p * rows for p, rows in sizes}
-    assert filter_scaling.fit(grid) == pytest.approx((3e-6, 5e-9))
+    assert filter_scaling.fit_line(grid) == pytest.approx((3e-6, 5e-9))
 
 
 @pytest.fixture
@@ -185,7 +185,9 @@ def test_a_short_run_becomes_a_page_that_renews_itself(claim, few, tmp_path):
 
 def test_claims_that_differ_in_their_case_are_one_line_with_the_worst():
     cases = [race.Claim("faster", 5.0, value, case=case) for case, value in {"a": 7.0, "b": 4.0, "c": None}.items()]
-    table = page.targets([race.Result("speed", "Speed", claims=[*cases, race.Claim("flat", 2.0, 1.0, at_most=True)])])
+    table = page.table_of_targets(
+        [race.Result("speed", "Speed", claims=[*cases, race.Claim("flat", 2.0, 1.0, at_most=True)])]
+    )
     assert "| faster | >= 5x | 4x | b (best of 2: 7x) | **missed, 1 not measured** |\n| flat | <= 2x | 1x |" in table
 
 
@@ -208,7 +210,7 @@ def test_a_claim_without_a_place_of_its_own_stands_under_further():
     text = "# Title\n<!-- begin further -->\nold\n<!-- end further -->\nprose\n"
     facts = {"processor": "a", "cores": 2, "l2_bytes": 2**20, "python": "3", "system": "b", "packages": {}}
     table = race.Table("Cost", ["nodes", "us"], [["225", "3"]])
-    new = page.rendered(text, [race.Result("nodes", "Nodes", tables=[table], machine=facts)])
+    new = page.fill_blocks(text, [race.Result("nodes", "Nodes", tables=[table], machine=facts)])
     assert "old" not in new and new.endswith("prose\n")
     assert "## Nodes\n\nCost:\n\n| nodes | us |\n| --- | --: |\n| 225 | 3 |\n" in new
 

@@ -30,7 +30,7 @@ def test_native_and_sync_give_the_same_bits():
 
 def test_a_difference_stops_the_race():
     with pytest.raises(SystemExit):
-        vector._equal([np.zeros(2)], [np.ones(2)], 1)
+        vector._check_equal([np.zeros(2)], [np.ones(2)], 1)
 
 
 def test_vector(monkeypatch):

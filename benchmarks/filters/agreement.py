@@ -37,7 +37,7 @@ def noisy_differences(
     """
     problem = Problem.draw(measurement, particles, rows, seed)
     kernel = estimates(enter(STRICT, problem))
-    with seeded(seed):
+    with seed_global_generators(seed):
         own = estimates(enter(name, replace(problem, keys=~problem.keys)))
     found = _differences("kernel", own, kernel)
     found["kernel, N_eff"] = _standard_errors(np.log(own[2] / kernel[2]).mean(axis=0))
@@ -73,7 +73,7 @@ def limit(figures: int, rows: int) -> float:
 
 
 @contextlib.contextmanager
-def seeded(seed: int) -> Iterator[None]:
+def seed_global_generators(seed: int) -> Iterator[None]:
     """The global generators, from which most packages resample, from a seed; afterwards as they were."""
     states = random.getstate(), np.random.get_state()
     random.seed(seed)
