@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wsn_env.bluetooth.calibration import NUMBERS, Calibration
+from wsn_env.bluetooth.calibration import SCALARS, Calibration
 from wsn_env.bluetooth.packets import HeldOut, hold_out
 from wsn_env.evaluation.files import replacing
 from wsn_env.models.recordings.dataset import Track
@@ -55,7 +55,7 @@ def quantity_rows(whole: Calibration, parts: Sequence[Calibration]) -> tuple[lis
     """The calibration's numbers with jackknife standard errors over the tracks; lists as their mean."""
     header = ["quantity", "meaning", "value", *(["standard error", "leaving out a track"] if parts else [])]
     rows = []
-    meanings = {name: meaning for name, (meaning, _) in NUMBERS.items()}
+    meanings = {name: meaning for name, (meaning, _) in SCALARS.items()}
     for name, meaning in (meanings | {"at_1m_db": "mean of P0, dBm", "exponents": "mean of n"}).items():
         row = [name, meaning, f"{_mean(whole, name):.4g}"]
         if parts:
