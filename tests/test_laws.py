@@ -233,7 +233,7 @@ def test_batteries_lose_what_the_outcome_reports(scenario, seed):
 
 @law(90)
 @given(scenarios(start="search"), SEEDS)
-def test_the_first_search_is_on_the_books(scenario, seed):
+def test_the_first_search_is_charged(scenario, seed):
     world, keys = World(scenario, threads=1), keys_of(seed, 4)
     state, outcome = world.restart(world.reset(keys), np.ones(4, bool), keys)
     spent = scenario.radio.battery_j - state.network.battery
