@@ -58,7 +58,7 @@ def run(folder: Path, arguments: argparse.Namespace) -> int:
     for claim in failed:
         console.print(f"failed: benchmarks.{claim}, see above", style="bold red")
     if not arguments.short:
-        page.renew(folder)
+        page.renew_page(folder)
         console.print(f"renewed {page.PAGE}")
     return 1 if failed else 0
 

@@ -16,7 +16,7 @@ import numpy as np
 from rich.console import Console
 
 from benchmarks.filters import Problem, enter
-from benchmarks.filters.agreement import STRICT, check
+from benchmarks.filters.agreement import STRICT, check_agreement
 from benchmarks.filters.book import BookFilter
 from benchmarks.naive import NaiveEnv
 from benchmarks.race import Claim, Options, Result, Table, Times, figure, interleave, main
@@ -41,7 +41,7 @@ LABELS = {
 
 def measure(options: Options, console: Console) -> Result:
     """Check, then race."""
-    agreement, _ = check(["NumPy f64, textbook", "filterpy's book"], "position", options.short)
+    agreement, _ = check_agreement(["NumPy f64, textbook", "filterpy's book"], "position", options.short)
     differences = episode_differences(*((8, 32, 500) if options.short else (24, 96, 1000)))
     if max(map(abs, differences.values())) > STANDARD_ERRORS:
         raise SystemExit(f"the naive environment has other episodes: {differences} standard errors")

@@ -11,7 +11,7 @@ round. With --short only positions.
 from rich.console import Console
 
 from benchmarks.filters import IMPLEMENTATIONS, SLOW_STARTERS, Problem, enter, kind_of
-from benchmarks.filters.agreement import check
+from benchmarks.filters.agreement import check_agreement
 from benchmarks.race import Claim, Options, Result, Table, Times, figure, interleave, main
 
 PARTICLES = 5000
@@ -38,7 +38,7 @@ def measure(options: Options, console: Console) -> Result:
     result.skipped |= {name: "a short run" for name in IMPLEMENTATIONS if name not in names}
     for measurement in list(MEASUREMENTS)[: 1 if options.short else None]:
         words = MEASUREMENTS[measurement]
-        checks, absent = check(names, measurement, options.short)
+        checks, absent = check_agreement(names, measurement, options.short)
         result.skipped |= absent
         console.print(f"{words}: {len(checks)} implementations compute the same posterior")
         times = {rows: race(list(checks), measurement, rows, options) for rows in (1, ROWS)}

@@ -31,12 +31,12 @@ WIDTH = 128
 MARKED = re.compile(r"(<!-- begin (\w+) -->\n).*?(<!-- end \2 -->)", flags=re.DOTALL)
 
 
-def renew(folder: Path = RESULTS, page: Path = PAGE) -> None:
+def renew_page(folder: Path = RESULTS, page: Path = PAGE) -> None:
     """Write the plots beside the page, and the page anew."""
     results = sorted((Result.load(path) for path in folder.glob("*.json")), key=_place)
     if not results:
         raise SystemExit(f"no results in {folder}: run python -m benchmarks")
-    for plot in plots(results).values():
+    for plot in make_plots(results).values():
         draw(plot, page.with_name(f"performance_{plot.name}.svg"))
     text = fill_blocks(page.read_text(), results)
     with replacing(page) as temporary:
@@ -47,7 +47,7 @@ def _place(result: Result) -> tuple[int, str]:
     return ORDER.index(result.name) if result.name in ORDER else len(ORDER), result.name
 
 
-def plots(results: list[Result]) -> dict[str, Plot]:
+def make_plots(results: list[Result]) -> dict[str, Plot]:
     """By name; the steps of whole environments are lines beside those of filters."""
     found = {plot.name: plot for result in results for plot in result.plots}
     if "rows" in found and ENVIRONMENTS in found:
@@ -62,7 +62,7 @@ def fill_blocks(text: str, results: list[Result]) -> str:
     own = {name for _, name, _ in MARKED.findall(text)}
     blocks = {"machine": machine(results), "targets": table_of_targets(results)}
     blocks |= {result.name: section(result, heading=False) for result in results}
-    drawn = plots(results)
+    drawn = make_plots(results)
     blocks["plots"] = "\n".join(_image(drawn[name]) for name in EVERY_IMPLEMENTATION if name in drawn)
     blocks["further"] = "\n".join(section(result) for result in results if result.name not in own)
     if "further" not in own and blocks["further"]:
@@ -156,7 +156,7 @@ def main() -> None:
     """Renew the page from a folder of results."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, nargs="?", default=RESULTS, help="where the JSON files are")
-    renew(parser.parse_args().folder)
+    renew_page(parser.parse_args().folder)
 
 
 if __name__ == "__main__":

@@ -44,7 +44,7 @@ def measure(options: Options, console: Console) -> Result:
             "csv and float": lambda: by_csv(path),
             "numpy.loadtxt": lambda: by_numpy(path),
         }
-        same_values(calls)
+        check_same_values(calls)
         times = interleave(calls, options)
         kilobytes = path.stat().st_size / 1000
     lines = [[name, figure(1000 * times.median(name)), figure(kilobytes / 1000 / times.median(name))] for name in calls]
@@ -62,7 +62,7 @@ def measure(options: Options, console: Console) -> Result:
     )
 
 
-def same_values(calls) -> None:
+def check_same_values(calls) -> None:
     """Raise unless all give the same times and levels."""
     track = calls["read_track"]()
     for name in ("csv and float", "numpy.loadtxt"):

@@ -41,7 +41,7 @@ def measure(options: Options, console: Console) -> Result:
     lines = []
     with one_core():
         for particles, target in TARGETS.items():
-            steps = same_bits(particles)
+            steps = count_equal_steps(particles)
             console.print(f"P = {particles}: both give the same bits for {steps} steps, resets among them")
             times = race(particles, ROWS, options)
             result.claims.append(
@@ -67,7 +67,7 @@ def make(name: str, rows: int, threads: int = 1, **overrides) -> gym.vector.Vect
     return gym.make_vec(ID, num_envs=rows, vectorization_mode=MODES[name], **more, **overrides)
 
 
-def same_bits(particles: int, rows: int = 8, periods: int = 6, steps: int = 20) -> int:
+def count_equal_steps(particles: int, rows: int = 8, periods: int = 6, steps: int = 20) -> int:
     """How many steps were compared: observations, rewards and ends, for random actions, over several short episodes.
 
     Raises:

@@ -94,14 +94,14 @@ def test_fast_c_leaves_the_process_its_denormals():
 
 def test_an_implementation_that_is_not_here_is_skipped_by_name(monkeypatch):
     monkeypatch.setitem(IMPLEMENTATIONS, "nobody", ("nobody", "Nobody"))
-    figures, absent = agreement.check(["nobody"], "position")
+    figures, absent = agreement.check_agreement(["nobody"], "position")
     assert figures == {} and "nobody" in absent["nobody"]
 
 
 def test_another_posterior_is_not_raced(monkeypatch):
     monkeypatch.setattr(kind_of("NumPy f64, textbook").kind, "estimate", lambda self: (np.zeros(4), np.eye(4)))
     with pytest.raises(SystemExit, match="textbook does not compute the same posterior"):
-        agreement.check(["NumPy f64, textbook"], "position")
+        agreement.check_agreement(["NumPy f64, textbook"], "position")
 
 
 def test_the_protocol_is_abstract():
@@ -176,10 +176,10 @@ def test_a_short_run_becomes_a_page_that_renews_itself(claim, few, tmp_path):
     result.save(folder / f"{result.name}.json")
     assert race.Result.load(folder / f"{result.name}.json").claims == result.claims
     text.write_text(page.PAGE.read_text())
-    page.renew(folder, text)
+    page.renew_page(folder, text)
     first = text.read_text(), [path.read_bytes() for path in sorted(tmp_path.glob("*.svg"))]
     assert result.tables[0].title in first[0] and len(first[1]) == len(result.plots)
-    page.renew(folder, text)
+    page.renew_page(folder, text)
     assert (text.read_text(), [path.read_bytes() for path in sorted(tmp_path.glob("*.svg"))]) == first
 
 
@@ -203,7 +203,7 @@ def test_whole_environments_are_lines_beside_the_filters():
         "env_rows", "Environments", "rows B", "environment steps/s", {"vector environment": [(1, 1.0)]}
     )
     results = [race.Result("vector", "", plots=[environments]), race.Result("filter_scaling", "", plots=[filters])]
-    assert [*page.plots(results)["rows"].lines] == ["ours", "vector environment"]
+    assert [*page.make_plots(results)["rows"].lines] == ["ours", "vector environment"]
 
 
 def test_a_claim_without_a_place_of_its_own_stands_under_further():

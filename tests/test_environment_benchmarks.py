@@ -25,7 +25,7 @@ def whole(result, claims: int):
 
 
 def test_native_and_sync_give_the_same_bits():
-    assert vector.same_bits(particles=300, rows=3, periods=4, steps=12) == 12
+    assert vector.count_equal_steps(particles=300, rows=3, periods=4, steps=12) == 12
 
 
 def test_a_difference_stops_the_race():

@@ -85,7 +85,7 @@ def seed_global_generators(seed: int) -> Iterator[None]:
         np.random.set_state(states[1])
 
 
-def check(
+def check_agreement(
     names: Iterable[str], measurement: str, short: bool = False
 ) -> tuple[dict[str, dict[str, float]], dict[str, str]]:
     """Figures of the implementations that are here, and why others are not. Raises if one computes something else.

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from wsn_env.bluetooth.calibration import SCALARS, Calibration
-from wsn_env.bluetooth.packets import HeldOut, hold_out
+from wsn_env.bluetooth.packets import HeldOut, held_out_residuals
 from wsn_env.evaluation.files import replacing
 from wsn_env.models.recordings.dataset import Track
 from wsn_env.reports.calibration_plots import draw_calibration
@@ -69,7 +69,7 @@ def quantity_rows(whole: Calibration, parts: Sequence[Calibration]) -> tuple[lis
 def _markdown(tracks: Sequence[Track], whole: Calibration, parts: Sequence[Calibration]) -> list[str]:
     """Lines of calibration.md."""
     q, found, fitted = whole.quantities, whole.found, whole.found["autocovariance_fit"]
-    held = hold_out(tracks, whole, parts)
+    held = held_out_residuals(tracks, whole, parts)
     against = "the calibration that left out its track" if parts else "this calibration"
     lines = [
         "# Calibration",
