@@ -216,7 +216,7 @@ def test_a_claim_without_a_place_of_its_own_stands_under_further():
 
 
 def test_labels_keep_their_distance():
-    assert plots._apart([0.0, 0.1, 5.0], 1.0) == pytest.approx([-0.45, 0.55, 5.0])
+    assert plots._move_apart([0.0, 0.1, 5.0], 1.0) == pytest.approx([-0.45, 0.55, 5.0])
 
 
 def test_a_failing_claim_does_not_stop_the_others(monkeypatch, tmp_path):
