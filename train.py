@@ -34,12 +34,12 @@ from wsn_env.evaluation.policies import Policy, make_policy, policy_names
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.evaluation.rollout import FIRST_SEED, evaluation_seeds
 from wsn_env.evaluation.versions import versions
-from wsn_env.learning.actor_critic import EntryPolicy, entry_sizes, network_of
+from wsn_env.learning.actor_critic import EntryPolicy, actor_network, entry_sizes
 from wsn_env.learning.checkpoints import CHECKPOINT, Watch, load_checkpoint, save_checkpoint
 from wsn_env.learning.concat_vector_env import ConcatVectorEnv
 from wsn_env.learning.defaults import default_level, default_node_counts, default_order
 from wsn_env.learning.levelling import LevelledRollout
-from wsn_env.learning.network import Network
+from wsn_env.learning.network import PolicyNetwork
 from wsn_env.learning.sb3 import SB3VecEnv
 from wsn_env.learning.training_reward import TrainingReward
 from wsn_env.models.measurement.base import Order
@@ -71,7 +71,7 @@ class Training:
     """Scenario quantities, as name=value: nodes=400 particles=1000."""
     vary: list[str] | None = None
     """Further scenarios to train in, each this one with some quantities changed: nodes=81 motion=turns,particles=1000.
-    The rows are dealt evenly among all. Left out: fewer and twice as many nodes, where they are drawn."""
+    The rows are divided evenly among all. Left out: fewer and twice as many nodes, where they are drawn."""
     action: Literal["menu", "subset"] = "menu"
     """What it chooses from."""
     order: Order | None = None
@@ -91,7 +91,7 @@ class Training:
     """What trains: stable-baselines3 in this process, or RLlib with a native batch in every runner of a Ray cluster.
     The network, the rewards and the fields are the same, PPO's details are each library's own."""
     runners: int = 2
-    """Of the Ray cluster, a core each; the rows are dealt among them."""
+    """Of the Ray cluster, a core each; the rows are divided among them."""
     address: str | None = None
     """Of a running Ray cluster; left out: one on this machine."""
 
@@ -161,20 +161,20 @@ def main() -> int:
 
 def train(settings: Training) -> None:
     """The whole story."""
-    scenario = complete(settings)
-    check(settings)
-    rules = opponents(scenario) if settings.episodes else {}
+    scenario = complete_settings(settings)
+    check_settings(settings)
+    rules = make_baselines(scenario) if settings.episodes else {}
     torch.set_num_threads(settings.torch_threads)
     observation: ObservationName = "menu" if settings.action == "menu" else "candidates"
     order = settings.order or default_order(scenario)
-    speaks = Settings(settings.action, observation, settings.reward, order)
+    interface = Settings(settings.action, observation, settings.reward, order)
     folder = open_folder(settings)
-    learn = learn_on_ray if settings.engine == "ray" else learn_here
-    network = learn(settings, scenario, speaks, folder)
+    learn = learn_on_ray if settings.engine == "ray" else learn_locally
+    network = learn(settings, scenario, interface, folder)
 
-    made = {name: value for name, value in plain(settings).items() if name not in ("name", "runs", "resume")}
+    made = {name: value for name, value in settings_as_json(settings).items() if name not in ("name", "runs", "resume")}
     facts = {"training": made, "scenario": scenario.as_dict(), "versions": versions()}
-    policy = save_policy(folder, network, speaks, facts)
+    policy = save_policy(folder, network, interface, facts)
     print(f"saved: {policy}")
     if settings.episodes:
         compare(settings, scenario, {"ppo": PPOPolicy(scenario, path=str(policy))} | rules, made)
@@ -182,7 +182,7 @@ def train(settings: Training) -> None:
         print(f"written: {write_report(folder, training=made)}")
 
 
-def complete(settings: Training) -> Scenario:
+def complete_settings(settings: Training) -> Scenario:
     """Fill in what was left out, by scenario, and return that."""
     if settings.tracks and Scenario.named(settings.scenario).measurement.lasting_errors:
         raise ValueError(
@@ -202,9 +202,9 @@ def complete(settings: Training) -> Scenario:
     return scenario.override(lam=low if len(settings.lam) == 1 else (low, high))
 
 
-def learn_here(settings: Training, scenario: Scenario, speaks: Settings, folder: Path) -> Network:
+def learn_locally(settings: Training, scenario: Scenario, interface: Settings, folder: Path) -> PolicyNetwork:
     """stable-baselines3's PPO."""
-    envs = SB3VecEnv(make_envs(settings, scenario, speaks, settings.rows), stagger=True)
+    envs = SB3VecEnv(make_envs(settings, scenario, interface, settings.rows), stagger=True)
     model = make_model(settings, VecMonitor(envs), folder)
     left = settings.steps - model.num_timesteps
     if left > 0:
@@ -222,19 +222,19 @@ def learn_here(settings: Training, scenario: Scenario, speaks: Settings, folder:
             f"{100 * envs.seconds / seconds:.0f} % of it in the environment, "
             f"{(time.process_time() - busy) / seconds:.1f} cores busy"
         )
-    return network_of(model)
+    return actor_network(model)
 
 
-def learn_on_ray(settings: Training, scenario: Scenario, speaks: Settings, folder: Path) -> Network:
+def learn_on_ray(settings: Training, scenario: Scenario, interface: Settings, folder: Path) -> PolicyNetwork:
     """RLlib's PPO."""
     try:
         from wsn_env.learning.rllib import RayTraining
     except ImportError as problem:
         raise ValueError(f"engine 'ray': pip install 'wsn_env[ray]' ({problem})") from None
 
-    whole = make_envs(settings, scenario, speaks, len(settings.vary or ()) + 1)
+    whole = make_envs(settings, scenario, interface, len(settings.vary or ()) + 1)
     training = RayTraining(
-        lambda rows: make_envs(settings, scenario, speaks, rows),
+        lambda rows: make_envs(settings, scenario, interface, rows),
         entry_sizes(settings.action, whole.single_observation_space, settings.units, settings.critic),
         folder / "ray",
         rows=settings.rows,
@@ -255,21 +255,21 @@ def learn_on_ray(settings: Training, scenario: Scenario, speaks: Settings, folde
         training.run(settings.steps, settings.checkpoint_steps, report)
         left, seconds = training.periods - before, time.perf_counter() - started
         print(f"trained {left:,} periods in {seconds:.0f} s ({left / seconds:,.0f} a second)")
-        return training.network()
+        return training.actor_network()
 
 
-def make_envs(settings: Training, scenario: Scenario, speaks: Settings, rows: int) -> ConcatVectorEnv:
-    """The rows, dealt among the scenarios."""
+def make_envs(settings: Training, scenario: Scenario, interface: Settings, rows: int) -> ConcatVectorEnv:
+    """The rows, divided among the scenarios."""
     scenarios = [scenario, *(scenario.override(**parse_overrides(text.split(","))) for text in settings.vary or ())]
     shares = np.diff(np.arange(len(scenarios) + 1) * rows // len(scenarios))
     parts = []
     for one, share in zip(scenarios, shares):
-        envs = ClusterVectorEnv(int(share), one, autoreset_mode="Disabled", **asdict(speaks))
+        envs = ClusterVectorEnv(int(share), one, autoreset_mode="Disabled", **asdict(interface))
         parts.append(TrainingReward(envs, calibrated=settings.reward == "belief"))
     return ConcatVectorEnv(parts)
 
 
-def check(settings: Training) -> None:
+def check_settings(settings: Training) -> None:
     """Refuse now what would fail after the training."""
     for name in "steps rows rollout batch epochs torch_threads checkpoint_steps".split():
         check_quantity("train.py", name, getattr(settings, name), at_least=1, whole=True)
@@ -307,7 +307,7 @@ def open_folder(settings: Training) -> Path:
     if path.exists() and begun:
         if not settings.resume:
             raise ValueError(f"{folder} exists: --resume continues it, --name begins another, or remove it")
-        old, new = json.loads(path.read_text()), plain(settings)
+        old, new = json.loads(path.read_text()), settings_as_json(settings)
         free = {"resume", "runs", "episodes", "evaluation_seed", "checkpoint_steps", "address"}
         differing = [name for name in new if name not in free and old.get(name) != new[name]]
         if differing:
@@ -315,11 +315,11 @@ def open_folder(settings: Training) -> Path:
             raise ValueError(f"{folder} was begun with {name} = {old.get(name)!r}: cannot resume it with {new[name]!r}")
     folder.mkdir(parents=True, exist_ok=True)
     with replacing(path) as temporary:
-        temporary.write_text(json.dumps(plain(settings), indent=1))
+        temporary.write_text(json.dumps(settings_as_json(settings), indent=1))
     return folder
 
 
-def plain(settings: Training) -> dict:
+def settings_as_json(settings: Training) -> dict:
     """JSON values of the settings."""
     return json.loads(json.dumps(asdict(settings), default=str))
 
@@ -357,7 +357,7 @@ def architecture(settings: Training, envs) -> tuple:
     return EntryPolicy, {"entries": entries}
 
 
-def opponents(scenario: Scenario) -> dict[str, Policy]:
+def make_baselines(scenario: Scenario) -> dict[str, Policy]:
     """Every installed policy by name; one that cannot be made is left out, and said."""
     made = {}
     names = [name for name in policy_names() if name not in (*SLOW, *SIZED)]

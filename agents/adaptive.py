@@ -40,14 +40,14 @@ class Adaptive(ViewPolicy):
 
     def __post_init__(self) -> None:
         check_order(self.order)
-        given: Sequence[Any] | None = self.switches
-        if given is None:
-            given = tuned(self.scenario, RULES[self.order])
-        if given is None:
-            given = [
+        switches: Sequence[Any] | None = self.switches
+        if switches is None:
+            switches = tuned(self.scenario, RULES[self.order])
+        if switches is None:
+            switches = [
                 (self.scenario.lam_range[0], 1, 4, 0.1 * self.scenario.radius_m, usual_hysteresis_m(self.scenario))
             ]
-        switches = tuple(sorted(Switch(*switch) for switch in given))
+        switches = tuple(sorted(Switch(*switch) for switch in switches))
         check_switches(switches)
         object.__setattr__(self, "switches", switches)
 

@@ -44,7 +44,7 @@ def draw_worlds(state: State, view: View, world: World, first: int, count: int) 
 
     The target comes from the belief's mean and covariance (eqs. 9-13 of Xiang & Guo, 2013, say what these are) and
     moves by constant velocity with the filter's noise (eq. 8). Worlds 2i and 2i + 1 lie on opposite sides of the mean.
-    A world's draws depend on its number and the view's luck alone.
+    A world's draws depend on its number and the view's `random_bits` alone.
 
     Args:
         state: (n * count rows) filled; row b is world first + b % count.
@@ -61,7 +61,7 @@ def _draw_worlds(first, count, q, period_s, search_gap, handle, knowledge_handle
     row, belief, bitmap = known.row[0], known.belief[0], known.reports.bitmap[0]
     for b in range(len(state.key)):
         number = first + b % count
-        key, pair = _world_key(row.luck, number), _world_key(row.luck, number - number % 2)
+        key, pair = _world_key(row.random_bits, number), _world_key(row.random_bits, number - number % 2)
         state.key[b] = key
         mine, own = state.row[b], state.belief.row[b]
         mine.period = 0
@@ -87,8 +87,8 @@ def _draw_worlds(first, count, q, period_s, search_gap, handle, knowledge_handle
 
 
 @lean_piece
-def _world_key(luck, number):
-    return draws.mix((uint64(luck) << uint64(32)) + uint64(number))
+def _world_key(random_bits, number):
+    return draws.mix((uint64(random_bits) << uint64(32)) + uint64(number))
 
 
 @piece
@@ -173,8 +173,8 @@ def _correct(mean, cov, hx, hy, innovation, r):
             cov[i, k] -= ph[i] * ph[k] / s
 
 
-def rows_of(value: Any, rows: Any) -> Any:
+def take_rows(value: Any, rows: Any) -> Any:
     """Some rows of a View or of a record of arrays: a slice, or their numbers."""
     if isinstance(value, View):
-        return View(rows_of(value.knowledge, rows))
+        return View(take_rows(value.knowledge, rows))
     return value.map(lambda array: array[rows])

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wsn_env.agents.base import ViewPolicy
-from wsn_env.agents.imagined import draw_worlds, imagined_world, place_nodes, rows_of
+from wsn_env.agents.imagined import draw_worlds, imagined_world, place_nodes, take_rows
 from wsn_env.agents.nearest import Nearest
 from wsn_env.envs.actions import MENU_MEMBERS, MenuAction
 from wsn_env.envs.rewards import belief_cost
@@ -80,7 +80,7 @@ class Planner(ViewPolicy):
         return imagined_world(self.scenario, self.horizon, usual if self.particles is None else self.particles)
 
     @cached_property
-    def _rehearsed(self) -> tuple[list[Nearest], np.ndarray, np.ndarray]:
+    def _rehearsals(self) -> tuple[list[Nearest], np.ndarray, np.ndarray]:
         """Fixed sizes with their mean error [m] and energy [mJ] in a period."""
         world = World(self.scenario.override(lam=0.0), threads=1)
         rules = [Nearest(self.scenario, n, order=self._order) for n in range(MENU_MEMBERS + 1)]
@@ -92,43 +92,43 @@ class Planner(ViewPolicy):
         """What is played after the choice."""
         if self.rule is not None:
             return self.rule
-        rules, errors_m, energies_mj = self._rehearsed
+        rules, errors_m, energies_mj = self._rehearsals
         return rules[int((errors_m + lam * energies_mj).argmin())]
 
     def act(self, view: View) -> Cluster:
         """Plan for every row, one after the other."""
-        room = self._world.allocate(ROWS)
-        chosen = [self._plan(rows_of(view, slice(row, row + 1)), room) for row in range(len(view.row))]
+        scratch = self._world.allocate(ROWS)
+        chosen = [self._plan(take_rows(view, slice(row, row + 1)), scratch) for row in range(len(view.row))]
         width = max((len(members) for _, members in chosen), default=0)
         members = np.full((len(chosen), width), -1, np.int32)
         for row, (_, own) in enumerate(chosen):
             members[row, : len(own)] = own
         return Cluster(np.array([head for head, _ in chosen], np.int64), members)
 
-    def _plan(self, view: View, room: State) -> tuple[int, np.ndarray]:
+    def _plan(self, view: View, scratch: State) -> tuple[int, np.ndarray]:
         """The head and the members for a view of one row."""
         rule, lam = self.rule_for(view.lam[0]), view.lam[0]
-        choices = self._choices(view, rule)
+        choices = self._list_choices(view, rule)
         left, costs = np.arange(len(choices.heads)), np.empty((len(choices.heads), 0))
-        place_nodes(room, view)
+        place_nodes(scratch, view)
         while len(left) > 1 and costs.shape[1] < self.worlds:
             done = costs.shape[1]
-            count = 2 * min((self.worlds - done + 1) // 2, len(room.key) // (2 * len(left)))
-            state = rows_of(room, slice(len(left) * count))
+            count = 2 * min((self.worlds - done + 1) // 2, len(scratch.key) // (2 * len(left)))
+            state = take_rows(scratch, slice(len(left) * count))
             draw_worlds(state, view, self._world, done, count)
             first = Cluster(choices.heads[left].repeat(count), choices.members[left].repeat(count, axis=0))
-            new = self._play(state, first, rule, lam).reshape(len(left), count)
+            new = self._discounted_costs(state, first, rule, lam).reshape(len(left), count)
             costs = np.concatenate([costs, new], axis=1)
-            stays = _in_doubt(costs, self.doubt)
+            stays = _near_cheapest(costs, self.doubt)
             left, costs = left[stays], costs[stays]
         best = 0 if left[0] == 0 else left[costs.mean(axis=1).argmin()]
         return choices.heads[best], choices.members[best]
 
-    def _choices(self, view: View, rule: Policy) -> Choices:
+    def _list_choices(self, view: View, rule: Policy) -> Choices:
         """The rule's own and those of the menu, each once."""
         own = rule.act(view)
         entries = np.flatnonzero(self._menu.masks(view)[0])
-        menu = self._menu.cluster(entries, rows_of(view, np.zeros(len(entries), int)))
+        menu = self._menu.cluster(entries, take_rows(view, np.zeros(len(entries), int)))
         width = max(own.members.shape[1], menu.members.shape[1])
         members = np.full((1 + len(entries), width), -1, np.int32)
         members[:1, : own.members.shape[1]], members[1:, : menu.members.shape[1]] = own.members, menu.members
@@ -137,7 +137,7 @@ class Planner(ViewPolicy):
         first = [named.index(name) for name in dict.fromkeys(named)]
         return Choices(heads[first], members[first])
 
-    def _play(self, state: State, choice: Cluster, rule: Policy, lam: float) -> np.ndarray:
+    def _discounted_costs(self, state: State, choice: Cluster, rule: Policy, lam: float) -> np.ndarray:
         """(B,) discounted costs of the choice and the rule after it [m]; the state's arrays are used up."""
         costs, weight = np.zeros(len(state.key)), 1.0
         for period in range(self.horizon):
@@ -148,7 +148,7 @@ class Planner(ViewPolicy):
         return costs
 
 
-def _in_doubt(costs: np.ndarray, doubt: float) -> np.ndarray:
+def _near_cheapest(costs: np.ndarray, doubt: float) -> np.ndarray:
     """(C,) bool: which choices are not plainly dearer than the cheapest.
 
     Args:

@@ -18,12 +18,12 @@ from gymnasium.spaces import Discrete
 from wsn_env.agents.base import ViewPolicy
 from wsn_env.envs.interface import Interface, Settings
 from wsn_env.evaluation.files import replacing
-from wsn_env.learning.network import EntryNetwork, FlatNetwork, Network
+from wsn_env.learning.network import EntryNetwork, FlatNetwork, PolicyNetwork
 from wsn_env.models.state import Cluster
 from wsn_env.simulation.view import View
 
 PRETRAINED = Path(__file__).parent / "pretrained"
-SPOKEN = (("menu", "menu"), ("menu", "candidates"), ("subset", "candidates"))
+INTERFACES = (("menu", "menu"), ("menu", "candidates"), ("subset", "candidates"))
 
 
 @dataclass(frozen=True, repr=False)
@@ -35,16 +35,16 @@ class PPOPolicy(ViewPolicy):
 
     def __repr__(self) -> str:
         """Tells it from others by what it has learned."""
-        weights = b"".join(array.tobytes() for array in self._parts[1].arrays.values())
+        weights = b"".join(array.tobytes() for array in self._interface_and_network[1].arrays.values())
         return f"PPOPolicy({self.path!r}, weights {hashlib.sha256(weights).hexdigest()[:16]})"
 
     def __getstate__(self) -> dict[str, Any]:
         """It takes its network along to machines that lack the file."""
-        assert self._parts
+        assert self._interface_and_network
         return self.__dict__
 
     @cached_property
-    def _parts(self) -> tuple[Interface, FlatNetwork | EntryNetwork]:
+    def _interface_and_network(self) -> tuple[Interface, FlatNetwork | EntryNetwork]:
         path = Path(self.path or PRETRAINED / self.scenario.name / "policy.json")
         if not self.path and not path.exists():
             shipped = ", ".join(sorted(folder.name for folder in PRETRAINED.iterdir() if folder.is_dir()))
@@ -55,38 +55,39 @@ class PPOPolicy(ViewPolicy):
         try:
             saved = json.loads(path.read_text())
             settings = Settings(**saved["interface"])
-            if (settings.action, settings.observation) not in SPOKEN:
-                raise ValueError(f"{path}: speaks {settings}: must be of {SPOKEN} (action, observation)")
+            if (settings.action, settings.observation) not in INTERFACES:
+                pair = settings.action, settings.observation
+                raise ValueError(f"{path}: (action, observation) = {pair}: must be one of {INTERFACES}")
             interface = Interface(self.scenario, settings)
         except (OSError, KeyError, TypeError, UnicodeDecodeError) as problem:
             raise ValueError(f"{path} is not a saved policy: {problem!r}") from None
-        network = Network.load(path.with_suffix(".safetensors"))
-        inputs, logits = interface.observation.space.shape[0], sum(_choices(interface.action.space))
+        network = PolicyNetwork.load(path.with_suffix(".safetensors"))
+        inputs, logits = interface.observation.space.shape[0], sum(_logit_counts(interface.action.space))
         if not network.fits(inputs, logits):
             raise ValueError(f"{path}: its network does not map {inputs} numbers to {logits}, as the environment wants")
         return interface, network
 
     def act(self, view: View) -> Cluster:
         """The most probable action, for every row."""
-        interface, network = self._parts
+        interface, network = self._interface_and_network
         logits = network.logits(interface.observation.encode(view))
-        ends = np.cumsum(_choices(interface.action.space))[:-1]
+        ends = np.cumsum(_logit_counts(interface.action.space))[:-1]
         best = np.stack([part.argmax(axis=1) for part in np.split(logits, ends, axis=1)], axis=1)
         return interface.action.cluster(best.reshape(len(best), *interface.action.space.shape), view)
 
 
-def _choices(space: Any) -> list[int]:
+def _logit_counts(space: Any) -> list[int]:
     """How many logits each component of an action has."""
     return [space.n] if isinstance(space, Discrete) else list(space.nvec)
 
 
-def save_policy(folder: str | Path, network: Network, settings: Settings, facts: dict[str, Any]) -> Path:
+def save_policy(folder: str | Path, network: PolicyNetwork, settings: Settings, facts: dict[str, Any]) -> Path:
     """Write policy.safetensors and policy.json; the latter last, so that a policy.json always has its network.
 
     Args:
         folder: exists.
         network: the actor.
-        settings: how the environment that it was trained in spoke.
+        settings: the interface of the environment that it was trained in.
         facts: anything worth knowing about the training, JSON values.
 
     Returns: path of policy.json.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wsn_env.agents.base import ViewPolicy
-from wsn_env.agents.strongest import first_of
+from wsn_env.agents.strongest import highest_scoring
 from wsn_env.models.quantity import check_quantity
 from wsn_env.models.state import Cluster
 from wsn_env.simulation.view import View
@@ -29,12 +29,12 @@ class Quadrants(ViewPolicy):
     def act(self, view: View) -> Cluster:
         """Choose, for every row."""
         nodes = view.alive.shape[1]
-        turn = _turns(view.positions, np.array(self.scenario.field.room_m) / 2)
+        turn = _order_of_turns(view.positions, np.array(self.scenario.field.room_m) / 2)
         waited = (turn - view.period[:, None] * (self.n + 1)) % nodes
-        return first_of(-waited, view, self.n)
+        return highest_scoring(-waited, view, self.n)
 
 
-def _turns(positions: np.ndarray, middle: np.ndarray) -> np.ndarray:
+def _order_of_turns(positions: np.ndarray, middle: np.ndarray) -> np.ndarray:
     """(B, S) each node's place in the round: the first of every quadrant, then the second of every quadrant, ..."""
     right, up = positions[:, :, 0] > middle[0], positions[:, :, 1] > middle[1]
     around = np.where(up, np.where(right, 2, 1), np.where(right, 3, 0))  # clockwise from the origin

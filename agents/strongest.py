@@ -26,10 +26,10 @@ class Strongest(ViewPolicy):
     def act(self, view: View) -> Cluster:
         """Choose, for every row."""
         level = view.receivers["latest_db"] if self.scenario.measurement.lasting_errors else -view.distance
-        return first_of(level, view, self.n)
+        return highest_scoring(level, view, self.n)
 
 
-def first_of(score: np.ndarray, view: View, n: int) -> Cluster:
+def highest_scoring(score: np.ndarray, view: View, n: int) -> Cluster:
     """A cluster of the n + 1 living nodes with the highest score (B, S); the first of them leads."""
     order = np.argsort(np.where(view.alive, -score, np.inf), axis=1, kind="stable")[:, : n + 1]
     nodes = np.where(np.take_along_axis(view.alive, order, axis=1), order, -1)

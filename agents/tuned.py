@@ -17,7 +17,7 @@ TABLE = Path(__file__).with_name("tuned.json")
 
 def tuned(scenario: Scenario, rule: str) -> Any:
     """What was found best for a rule in the scenario of this name; None: nothing was tuned."""
-    return _table().get(scenario.name, {}).get(rule)
+    return _load_table().get(scenario.name, {}).get(rule)
 
 
 def nearest_lam(lams: npt.ArrayLike, lam: npt.ArrayLike) -> np.ndarray:
@@ -27,5 +27,5 @@ def nearest_lam(lams: npt.ArrayLike, lam: npt.ArrayLike) -> np.ndarray:
 
 
 @cache
-def _table() -> dict[str, Any]:
+def _load_table() -> dict[str, Any]:
     return json.loads(TABLE.read_text())["scenarios"]

@@ -1,1 +1,1 @@
-"""Claims about speed, one a file, each with the contestants that it needs."""
+"""Claims about speed, one a file, each with the implementations that it needs."""

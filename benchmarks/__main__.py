@@ -25,7 +25,7 @@ CLAIMS = (
 def main() -> int:
     """Run, report, renew the page. Returns the exit code: 1 if a claim's process failed, not if a target is missed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rounds", type=int, help="turns of each contestant")
+    parser.add_argument("--rounds", type=int, help="turns of each implementation")
     parser.add_argument("--short", action="store_true", help="a glance; leaves docs/performance.md as it is")
     parser.add_argument("--folder", type=Path, help="where to put the results (a glance's are not kept)")
     arguments = parser.parse_args()
@@ -58,7 +58,7 @@ def run(folder: Path, arguments: argparse.Namespace) -> int:
     for claim in failed:
         console.print(f"failed: benchmarks.{claim}, see above", style="bold red")
     if not arguments.short:
-        page.renew(folder)
+        page.renew_page(folder)
         console.print(f"renewed {page.PAGE}")
     return 1 if failed else 0
 

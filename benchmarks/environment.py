@@ -16,7 +16,7 @@ import numpy as np
 from rich.console import Console
 
 from benchmarks.filters import Problem, enter
-from benchmarks.filters.agreement import STRICT, check
+from benchmarks.filters.agreement import STRICT, check_agreement
 from benchmarks.filters.book import BookFilter
 from benchmarks.naive import NaiveEnv
 from benchmarks.race import Claim, Options, Result, Table, Times, figure, interleave, main
@@ -41,7 +41,7 @@ LABELS = {
 
 def measure(options: Options, console: Console) -> Result:
     """Check, then race."""
-    agreement, _ = check(["NumPy f64, textbook", "filterpy's book"], "position", options.short)
+    agreement, _ = check_agreement(["NumPy f64, textbook", "filterpy's book"], "position", options.short)
     differences = episode_differences(*((8, 32, 500) if options.short else (24, 96, 1000)))
     if max(map(abs, differences.values())) > STANDARD_ERRORS:
         raise SystemExit(f"the naive environment has other episodes: {differences} standard errors")
@@ -49,7 +49,7 @@ def measure(options: Options, console: Console) -> Result:
         f"Episodes: RMS error differs by {differences['rms_m']:+.1f} standard errors,"
         f" energy by {differences['energy_mj']:+.1f}"
     )
-    field, skipped = contestants()
+    field, skipped = implementations()
     times = interleave(
         {name: call for name, (call, _) in field.items()}, options, {name: steps for name, (_, steps) in field.items()}
     )
@@ -77,17 +77,17 @@ def measure(options: Options, console: Console) -> Result:
 
 
 def table(times: Times) -> Table:
-    """A line a contestant."""
+    """A line an implementation."""
     lines = []
     for name in times.seconds:
         low, high = times.spread(name, "single")
         seconds = times.median(name)
         ratio = f"{figure(times.ratio(name, 'single'))} ({figure(low)}-{figure(high)})"
         lines.append([LABELS[name], f"{1e6 * seconds:.1f}", f"{1 / seconds:,.0f}", ratio])
-    return Table("Steps of one field", ["contestant", "us/step", "steps/s", "time over gym.make's"], lines)
+    return Table("Steps of one field", ["implementation", "us/step", "steps/s", "time over gym.make's"], lines)
 
 
-def contestants() -> tuple[dict[str, tuple[Callable[[], object], int]], dict[str, str]]:
+def implementations() -> tuple[dict[str, tuple[Callable[[], object], int]], dict[str, str]]:
     """By name: a function, and how many steps of one field a call of it is. And by label: who cannot take part, why."""
     envs = gym.make_vec(ID, num_envs=ROWS, vectorization_mode="vector_entry_point", threads=1)
     naive, book = NaiveEnv(), NaiveEnv(kind=BookFilter)

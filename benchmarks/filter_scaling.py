@@ -3,7 +3,7 @@ particles, 1 to 1024 rows and P B >= 5000 (35 % where a call's data are beyond t
 
     python -m benchmarks.filter_scaling [--rounds N] [--short] [--json FILE]
 
-Also every contestant's time against particles, and its filter steps/s against rows.
+Also every implementation's time against particles, and its filter steps/s against rows.
 """
 
 from collections.abc import Iterable
@@ -11,7 +11,7 @@ from collections.abc import Iterable
 import numpy as np
 from rich.console import Console
 
-from benchmarks.filters import CONTESTANTS, SLOW_STARTERS, Absent, Contestant, Looped, Problem, enter, kind_of
+from benchmarks.filters import IMPLEMENTATIONS, SLOW_STARTERS, Absent, Implementation, Looped, Problem, enter, kind_of
 from benchmarks.race import Claim, Options, Plot, Result, Table, Times, interleave, l2_bytes, main
 
 STRICT = "wsn_env, strict"
@@ -20,9 +20,9 @@ PLOT_PARTICLES = (500, 1500, 5000, 15_000, 50_000)
 LEAST = 5000  # particles in all rows: below, the call itself counts
 BYTES, SCRATCH_BYTES = 20, 48  # a particle: state and log weight; and of one row weight, 3 slots, 2 states
 WITHIN, BEYOND = 20.0, 35.0  # %
-RACED = [name for name in CONTESTANTS if name not in SLOW_STARTERS]
+RACED = [name for name in IMPLEMENTATIONS if name not in SLOW_STARTERS]
 SHORT_LIMIT = 50_000  # particles in all rows
-FEW = 64  # rows, up to which contestants have turns
+FEW = 64  # rows, up to which implementations have turns
 
 
 def measure(options: Options, console: Console) -> Result:
@@ -30,7 +30,7 @@ def measure(options: Options, console: Console) -> Result:
     result = Result(name="filter_scaling", title="Scaling of the filter")
     result.skipped = dict.fromkeys(SLOW_STARTERS, "compiles for seconds for every shape")
     grid = kernel_grid(options, console)
-    a, b = fit(grid)
+    a, b = fit_line(grid)
     deviations = {point: 100 * (seconds / (a + b * point[0] * point[1]) - 1) for point, seconds in grid.items()}
     inside = {
         (p, rows): value for (p, rows), value in deviations.items() if p * (BYTES * rows + SCRATCH_BYTES) <= l2_bytes()
@@ -66,8 +66,8 @@ def kernel_grid(options: Options, console: Console) -> dict[tuple[int, int], flo
     if options.short:
         points = [(p, rows) for p, rows in points if p * rows <= SHORT_LIMIT]
     console.print(f"filter kernel, {len(points)} sizes", style="dim")
-    contestants = {f"{p} x {rows}": enter(STRICT, shared_cloud(p, rows)) for p, rows in points}
-    calls = {name: contestant.step for name, contestant in contestants.items()}
+    implementations = {f"{p} x {rows}": enter(STRICT, shared_cloud(p, rows)) for p, rows in points}
+    calls = {name: implementation.step for name, implementation in implementations.items()}
     times = interleave(calls, options, turn_s=options.turn_s / 2)
     return {point: times.median(name) for point, name in zip(points, calls)}
 
@@ -82,7 +82,7 @@ def shared_cloud(particles: int, rows: int) -> Problem:
     return Problem(**problem.__dict__ | parts)
 
 
-def fit(grid: dict[tuple[int, int], float]) -> tuple[float, float]:
+def fit_line(grid: dict[tuple[int, int], float]) -> tuple[float, float]:
     """a, b [s] of the line a + b P B with the least squares of relative deviations."""
     seconds = np.array(list(grid.values()))
     sizes = np.array([p * rows for p, rows in grid])
@@ -95,12 +95,12 @@ def table(grid: dict, deviations: dict) -> Table:
     """Particles down, rows across."""
     lines = []
     for p in PARTICLES:
-        cells = [f"{_time(grid[p, b])} ({deviations[p, b]:+.0f} %)" if (p, b) in grid else "" for b in ROWS]
+        cells = [f"{_format_time(grid[p, b])} ({deviations[p, b]:+.0f} %)" if (p, b) in grid else "" for b in ROWS]
         lines.append([f"{p:,}", *cells])
     return Table("Filter kernel, time of a call", ["particles", *(f"B = {b}" for b in ROWS)], lines)
 
 
-def _time(seconds: float) -> str:
+def _format_time(seconds: float) -> str:
     return f"{1e6 * seconds:.1f} us" if seconds < 1e-3 else f"{1e3 * seconds:.3g} ms"
 
 
@@ -110,31 +110,35 @@ Lines = dict[str, list[tuple[int, float]]]
 
 
 def against_particles(options: Options, console: Console, result: Result) -> Lines:
-    """(P, seconds a step) by contestant, one row."""
+    """(P, seconds a step) by implementation, one row."""
     sizes = PLOT_PARTICLES[:3] if options.short else PLOT_PARTICLES
     lines: Lines = {}
     for p in sizes:
-        console.print(f"every contestant, {p} particles", style="dim")
-        entered = _entered(RACED, Problem.draw("position", p), result.skipped)
-        _extend(lines, p, interleave({name: contestant.step for name, contestant in entered.items()}, _few(options)))
+        console.print(f"every implementation, {p} particles", style="dim")
+        entered = _enter_present(RACED, Problem.draw("position", p), result.skipped)
+        _add_points(lines, p, interleave({name: each.step for name, each in entered.items()}, _fewer_rounds(options)))
     return lines
 
 
 def against_rows(options: Options, console: Console) -> Lines:
-    """(B, seconds a step of all rows) by contestant, P = 5000."""
+    """(B, seconds a step of all rows) by implementation, P = 5000."""
     lines: Lines = {}
     for rows in ROWS[:3] if options.short else ROWS:
-        console.print(f"every contestant, {rows} rows", style="dim")
+        console.print(f"every implementation, {rows} rows", style="dim")
         problem = shared_cloud(5000, rows)
         for name in RACED:  # one in memory at a time: with many rows some need gigabytes
-            for contestant in _entered([name], problem, {}).values():
+            for implementation in _enter_present([name], problem, {}).values():
                 once = options.short or rows >= FEW
-                times = _once(name, contestant) if once else interleave({name: contestant.step}, _few(options))
-                _extend(lines, rows, times)
+                times = (
+                    _time_once(name, implementation)
+                    if once
+                    else interleave({name: implementation.step}, _fewer_rounds(options))
+                )
+                _add_points(lines, rows, times)
     return lines
 
 
-def _entered(names: Iterable[str], problem: Problem, skipped: dict[str, str]) -> dict:
+def _enter_present(names: Iterable[str], problem: Problem, skipped: dict[str, str]) -> dict:
     entered = {}
     for name in names:
         try:
@@ -144,21 +148,21 @@ def _entered(names: Iterable[str], problem: Problem, skipped: dict[str, str]) ->
     return entered
 
 
-def _extend(lines: Lines, x: int, times: Times) -> None:
+def _add_points(lines: Lines, x: int, times: Times) -> None:
     for name in times.seconds:
         lines.setdefault(name, []).append((x, times.median(name)))
 
 
-def _few(options: Options) -> Options:
+def _fewer_rounds(options: Options) -> Options:
     """A plot on log axes needs no more."""
     return Options(min(options.rounds, 5), options.short)
 
 
-def _once(name: str, contestant: Contestant) -> Times:
-    """One step: of many rows it is long enough. Batched contestants compile and touch their memory in a first one."""
-    if not isinstance(contestant, Looped):
-        contestant.step()
-    return interleave({name: contestant.step}, Options(rounds=1), turn_s=0.0, warm=False)
+def _time_once(name: str, implementation: Implementation) -> Times:
+    """One step: of many rows it is long enough. Batched ones compile and touch their memory before."""
+    if not isinstance(implementation, Looped):
+        implementation.step()
+    return interleave({name: implementation.step}, Options(rounds=1), turn_s=0.0, warm=False)
 
 
 if __name__ == "__main__":

@@ -4,14 +4,14 @@ and at half the speed of C (three quarters).
 
     python -m benchmarks.filter_step [--rounds N] [--short] [--json FILE]
 
-First every contestant has to compute the same posterior. Slowdowns are over wsn_env's strict kernel in the same round.
-With --short only positions.
+First every implementation has to compute the same posterior. Slowdowns are over wsn_env's strict kernel in the same
+round. With --short only positions.
 """
 
 from rich.console import Console
 
-from benchmarks.filters import CONTESTANTS, SLOW_STARTERS, Problem, enter, kind_of
-from benchmarks.filters.agreement import check
+from benchmarks.filters import IMPLEMENTATIONS, SLOW_STARTERS, Problem, enter, kind_of
+from benchmarks.filters.agreement import check_agreement
 from benchmarks.race import Claim, Options, Result, Table, Times, figure, interleave, main
 
 PARTICLES = 5000
@@ -31,16 +31,16 @@ def measure(options: Options, console: Console) -> Result:
         name="filter_step",
         title="One filter step",
         text=f"P = {PARTICLES}, m = 4 reports, resampling in every step, one thread. Microseconds a step of a row, and"
-        " slowdown against the strict kernel in the same round (median, quartiles). Contestants without a batch form"
-        f" have no figures at {ROWS} rows.",
+        " slowdown against the strict kernel in the same round (median, quartiles). Implementations without a batch"
+        f" form have no figures at {ROWS} rows.",
     )
-    names = [name for name in CONTESTANTS if name not in SLOW_STARTERS or not options.short]
-    result.skipped |= {name: "a short run" for name in CONTESTANTS if name not in names}
+    names = [name for name in IMPLEMENTATIONS if name not in SLOW_STARTERS or not options.short]
+    result.skipped |= {name: "a short run" for name in IMPLEMENTATIONS if name not in names}
     for measurement in list(MEASUREMENTS)[: 1 if options.short else None]:
         words = MEASUREMENTS[measurement]
-        checks, absent = check(names, measurement, options.short)
+        checks, absent = check_agreement(names, measurement, options.short)
         result.skipped |= absent
-        console.print(f"{words}: {len(checks)} contestants compute the same posterior")
+        console.print(f"{words}: {len(checks)} implementations compute the same posterior")
         times = {rows: race(list(checks), measurement, rows, options) for rows in (1, ROWS)}
         result.tables.append(table(f"Filter step, {words}", checks, times))
         result.claims += claims(words, times[1], result.skipped)
@@ -57,12 +57,12 @@ def race(names: list[str], measurement: str, rows: int, options: Options) -> Tim
     problem = Problem.draw(measurement, PARTICLES, rows)
     entered = {name: enter(name, problem) for name in names if rows == 1 or kind_of(name).batches}
     return interleave(
-        {name: contestant.step for name, contestant in entered.items()}, options, dict.fromkeys(entered, rows)
+        {name: implementation.step for name, implementation in entered.items()}, options, dict.fromkeys(entered, rows)
     )
 
 
 def table(title: str, names, times: dict[int, Times]) -> Table:
-    """A line a contestant, slowest first."""
+    """A line an implementation, slowest first."""
     lines = []
     for name in sorted(names, key=times[1].median, reverse=True):
         line = [name]
@@ -73,7 +73,7 @@ def table(title: str, names, times: dict[int, Times]) -> Table:
             low, high = found.spread(name, STRICT)
             line += [f"{1e6 * found.median(name):.1f}", f"{figure(found.ratio(name, STRICT))} ({_span(low, high)})"]
         lines.append(line)
-    return Table(title, ["contestant", "us, 1 row", "slowdown", f"us/row, {ROWS} rows", "slowdown"], lines)
+    return Table(title, ["implementation", "us, 1 row", "slowdown", f"us/row, {ROWS} rows", "slowdown"], lines)
 
 
 def _span(low: float, high: float) -> str:

@@ -66,7 +66,7 @@ def measure(options: Options, console: Console) -> Result:
         "Pillow, jagged": lambda: by_pillow(state, scenario, estimates, 1),
         "Pillow, smooth": lambda: by_pillow(state, scenario, estimates, 2),
     }
-    same_colours(calls)
+    check_same_colours(calls)
     times = interleave(calls, options)
     return Result(
         name="frames",
@@ -89,7 +89,7 @@ def measure(options: Options, console: Console) -> Result:
     )
 
 
-def same_colours(calls) -> None:
+def check_same_colours(calls) -> None:
     """Raise unless every painter has drawn awake nodes, head and track."""
     for name, call in calls.items():
         picture = call()

@@ -49,7 +49,7 @@ def measure(options: Options, console: Console) -> Result:
         basis = 24 * particles + 64 * nodes
         counted = bytes_by_part(_world(particles, nodes).allocate(1))
         total = sum(counted.values())
-        grown, why = growth(particles, nodes, rows)
+        grown, why = measure_growth(particles, nodes, rows)
         resident = None if grown is None else (grown - scratch_bytes(particles)) / rows
         result.claims += [
             Claim(
@@ -84,17 +84,17 @@ def scratch_bytes(particles: int) -> int:
     return sum(array.nbytes for array in make_scratch.py_func(particles))
 
 
-def growth(particles: int, nodes: int, rows: int) -> tuple[int | None, str]:
+def measure_growth(particles: int, nodes: int, rows: int) -> tuple[int | None, str]:
     """Bytes by which a process grows at its peak when it resets and steps; or None and why it cannot be told."""
     if not CLEAR.exists():
         return None, f"no {CLEAR}"
-    program = f"from benchmarks.memory import grow; grow({particles}, {nodes}, {rows})"
+    program = f"from benchmarks.memory import print_growth; print_growth({particles}, {nodes}, {rows})"
     command, settings = [sys.executable, "-c", program], os.environ | FRESH
     child = subprocess.run(command, cwd=HERE, env=settings, capture_output=True, text=True, check=True)
     return json.loads(child.stdout.splitlines()[-1]), ""
 
 
-def grow(particles: int, nodes: int, rows: int) -> None:
+def print_growth(particles: int, nodes: int, rows: int) -> None:
     """In the child: print the growth. Two rows run before, so that the code is loaded."""
     world = _world(particles, nodes)
     kept = [_run(world, 2)]  # not freed: what comes could settle in its place, unseen

@@ -1,4 +1,4 @@
-"""The contestant: system A's environment as one would first write it, after the paper and a textbook.
+"""The implementation: system A's environment as one would first write it, after the paper and a textbook.
 
 NumPy in double precision, NumPy's generator, Python loops over the members, one field at a time. The physics is that of
 wsn_env's PreDC-v0 without the search for lost targets (so that it does less).

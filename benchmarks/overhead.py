@@ -124,12 +124,12 @@ class Recorder:
     def correct(self, keys, periods, belief: Belief, network: Network, reports: Reports, resampled) -> None:
         """A new period."""
         width = max(1, reports.count.max())
-        seen = Reports(
+        received = Reports(
             reports.count.copy(), reports.node[:, :width].copy(), reports.value[:, :width].copy(), reports.bitmap
         )
         predicted = belief.predicted_mean.copy()
         self.tracker.correct(keys, periods, belief, network, reports, resampled)
-        self.record.corrections.append(Correction(periods.copy(), predicted, seen, resampled.copy()))
+        self.record.corrections.append(Correction(periods.copy(), predicted, received, resampled.copy()))
         self.record.network, self.record.end = network, belief
 
     def relocate(self, keys, periods, rows, belief: Belief) -> None:
@@ -213,8 +213,8 @@ class Episode:
         """The recorded environment is the one that is timed."""
         same = np.array_equal(self.envs.reset(seed=SEED)[0], recorded.reset(seed=SEED)[0])
         for _ in range(self.envs.scenario.periods):
-            got, wanted = self.envs.step(self.actions), recorded.step(self.actions)
-            same &= np.array_equal(got[0], wanted[0]) and np.array_equal(got[1], wanted[1])
+            timed_step, recorded_step = self.envs.step(self.actions), recorded.step(self.actions)
+            same &= all(np.array_equal(timed_step[i], recorded_step[i]) for i in (0, 1))
         if not same:
             raise SystemExit("the recorded episode is another one: nothing to time")
 

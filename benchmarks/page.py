@@ -3,7 +3,7 @@
     python -m benchmarks.page [FOLDER]
 
 Markers are `<!-- begin NAME -->` and `<!-- end NAME -->`: `machine`, `targets`, one for any claim by its name,
-`further` for the claims without their own, and `plots` for those with every contestant.
+`further` for the claims without their own, and `plots` for those with every implementation.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ ORDER = (
     *("filter_step", "environment", "vector", "overhead", "training", "rllib", "filter_scaling", "nodes", "memory"),
     *("recording", "frames"),
 )
-EVERY_CONTESTANT = ("particles", "rows")  # plots that stand together, at the end
+EVERY_IMPLEMENTATION = ("particles", "rows")  # plots that stand together, at the end
 ENVIRONMENTS = "env_rows"  # joins the second of them
 WIDTH = 128
 MARKED = re.compile(r"(<!-- begin (\w+) -->\n).*?(<!-- end \2 -->)", flags=re.DOTALL)
 
 
-def renew(folder: Path = RESULTS, page: Path = PAGE) -> None:
+def renew_page(folder: Path = RESULTS, page: Path = PAGE) -> None:
     """Write the plots beside the page, and the page anew."""
     results = sorted((Result.load(path) for path in folder.glob("*.json")), key=_place)
     if not results:
         raise SystemExit(f"no results in {folder}: run python -m benchmarks")
-    for plot in plots(results).values():
+    for plot in make_plots(results).values():
         draw(plot, page.with_name(f"performance_{plot.name}.svg"))
-    text = rendered(page.read_text(), results)
+    text = fill_blocks(page.read_text(), results)
     with replacing(page) as temporary:
         temporary.write_text(text)
 
@@ -47,7 +47,7 @@ def _place(result: Result) -> tuple[int, str]:
     return ORDER.index(result.name) if result.name in ORDER else len(ORDER), result.name
 
 
-def plots(results: list[Result]) -> dict[str, Plot]:
+def make_plots(results: list[Result]) -> dict[str, Plot]:
     """By name; the steps of whole environments are lines beside those of filters."""
     found = {plot.name: plot for result in results for plot in result.plots}
     if "rows" in found and ENVIRONMENTS in found:
@@ -57,13 +57,13 @@ def plots(results: list[Result]) -> dict[str, Plot]:
     return found
 
 
-def rendered(text: str, results: list[Result]) -> str:
+def fill_blocks(text: str, results: list[Result]) -> str:
     """The page's text with new blocks. Doing it twice changes nothing."""
     own = {name for _, name, _ in MARKED.findall(text)}
-    blocks = {"machine": machine(results), "targets": targets(results)}
+    blocks = {"machine": machine(results), "targets": table_of_targets(results)}
     blocks |= {result.name: section(result, heading=False) for result in results}
-    drawn = plots(results)
-    blocks["plots"] = "\n".join(_image(drawn[name]) for name in EVERY_CONTESTANT if name in drawn)
+    drawn = make_plots(results)
+    blocks["plots"] = "\n".join(_image(drawn[name]) for name in EVERY_IMPLEMENTATION if name in drawn)
     blocks["further"] = "\n".join(section(result) for result in results if result.name not in own)
     if "further" not in own and blocks["further"]:
         raise SystemExit(f"{PAGE.name} has no place for further claims: add <!-- begin further --> and its end")
@@ -73,30 +73,30 @@ def rendered(text: str, results: list[Result]) -> str:
 def machine(results: list[Result]) -> str:
     """Where the figures come from; the claims of one page should share it."""
     lines = []
-    for facts in _distinct([result.machine for result in results]):
+    for facts in _distinct_machines([result.machine for result in results]):
         packages = ", ".join(f"{name} {number}" for name, number in sorted(facts["packages"].items()))
         text = (
             f"{facts['processor']}, {facts['cores']} cores, {facts['l2_bytes'] // 1024} KiB of L2 cache each,"
             f" {facts['system']}, Python {facts['python']}; {packages}."
         )
-        lines.append(_wrapped(text))
+        lines.append(_wrap_text(text))
     return "\n".join(lines)
 
 
-def _distinct(machines: list[dict]) -> list[dict]:
+def _distinct_machines(machines: list[dict]) -> list[dict]:
     """Machines that differ in more than the packages that a claim names; these joined."""
     distinct: list[dict] = []
     for facts in machines:
-        for known in distinct:
-            if {**known, "packages": 0} == {**facts, "packages": 0}:
-                known["packages"] = known["packages"] | facts["packages"]
+        for joined in distinct:
+            if {**joined, "packages": 0} == {**facts, "packages": 0}:
+                joined["packages"] = joined["packages"] | facts["packages"]
                 break
         else:
             distinct.append(dict(facts))
     return distinct
 
 
-def targets(results: list[Result]) -> str:
+def table_of_targets(results: list[Result]) -> str:
     """All claims in a table: a line for those that differ in their case only, with the worst of them."""
     lines: dict[tuple, list[Claim]] = {}
     for result in results:
@@ -127,12 +127,12 @@ def _line(claims: list[Claim]) -> list[str]:
 def section(result: Result, heading: bool = True) -> str:
     """Text, tables, what was skipped, plots."""
     parts = [f"## {result.title}\n"] if heading else []
-    parts += [_wrapped(result.text)] if result.text else []
+    parts += [_wrap_text(result.text)] if result.text else []
     parts += [f"{table.title}:\n\n{markdown(table)}" for table in result.tables]
     if result.skipped:
         names = "; ".join(f"{name} ({reason})" for name, reason in result.skipped.items())
-        parts.append(_wrapped(f"Skipped: {names}."))
-    elsewhere = (*EVERY_CONTESTANT, ENVIRONMENTS)
+        parts.append(_wrap_text(f"Skipped: {names}."))
+    elsewhere = (*EVERY_IMPLEMENTATION, ENVIRONMENTS)
     parts += [_image(plot) for plot in result.plots if plot.name not in elsewhere]
     return "\n".join(parts)
 
@@ -141,7 +141,7 @@ def _image(plot: Plot) -> str:
     return f"![{plot.title}](performance_{plot.name}.svg)\n"
 
 
-def _wrapped(text: str) -> str:
+def _wrap_text(text: str) -> str:
     return textwrap.fill(text, WIDTH, break_on_hyphens=False) + "\n"
 
 
@@ -156,7 +156,7 @@ def main() -> None:
     """Renew the page from a folder of results."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, nargs="?", default=RESULTS, help="where the JSON files are")
-    renew(parser.parse_args().folder)
+    renew_page(parser.parse_args().folder)
 
 
 if __name__ == "__main__":

@@ -52,7 +52,7 @@ def _label(axes, plot: Plot, colours: dict[str, str]) -> None:
     height = 72 * axes.get_figure().get_figheight() * 0.85  # of the axes [points]
     per_point = math.log(high / low) / height
     ends = [math.log(plot.lines[name][-1][1]) for name in names]
-    places = _apart(ends, LABEL_POINTS * per_point)
+    places = _move_apart(ends, LABEL_POINTS * per_point)
     for name, end, place in zip(names, ends, places):
         x, y = plot.lines[name][-1]
         axes.annotate(
@@ -68,7 +68,7 @@ def _label(axes, plot: Plot, colours: dict[str, str]) -> None:
         )
 
 
-def _apart(places: list[float], distance: float) -> list[float]:
+def _move_apart(places: list[float], distance: float) -> list[float]:
     """Ascending places moved as little as it takes to keep a distance: neighbours too near share their mean."""
     groups: list[tuple[float, int]] = []  # centre, members
     for place in places:

@@ -1,4 +1,4 @@
-"""Races: contestants have turns in every round, in one process, so that a ratio is of times from the same minutes.
+"""Races: implementations have turns in every round, in one process, so that a ratio is of times from the same minutes.
 
 A claim file measures, and returns a `Result`: tables, claims with their verdicts, and plots. `main` gives all of them
 the same command line:
@@ -48,12 +48,12 @@ class Options:
 
     @property
     def turn_s(self) -> float:
-        """What a contestant gets in a round."""
+        """What an implementation gets in a round."""
         return SHORT_TURN_S if self.short else TURN_S
 
 
 class Times:
-    """Seconds a unit of work, by contestant and round."""
+    """Seconds a unit of work, by implementation and round."""
 
     def __init__(self, seconds: dict[str, list[float]]):
         self.seconds = seconds
@@ -83,7 +83,7 @@ def interleave(
     turn_s: float | None = None,
     warm: bool = True,
 ) -> Times:
-    """Give every contestant a turn in every round.
+    """Give every implementation a turn in every round.
 
     Args:
         calls: by name, a function without arguments.
@@ -191,7 +191,7 @@ class Result:
     claims: list[Claim] = field(default_factory=list)
     tables: list[Table] = field(default_factory=list)
     plots: list[Plot] = field(default_factory=list)
-    skipped: dict[str, str] = field(default_factory=dict)  # contestants by name: why
+    skipped: dict[str, str] = field(default_factory=dict)  # implementations by name: why
     figures: dict = field(default_factory=dict)  # unrounded, for other programs
     packages: list[str] = field(default_factory=list)  # distributions whose versions matter
     machine: dict = field(default_factory=dict)
@@ -280,7 +280,7 @@ def _read(path: str) -> str:
 def parser(description: str | None) -> argparse.ArgumentParser:
     """--rounds, --short, --json."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rounds", type=int, help=f"turns of each contestant ({ROUNDS}; {SHORT_ROUNDS} with --short)")
+    parser.add_argument("--rounds", type=int, help=f"turns of each ({ROUNDS}; {SHORT_ROUNDS} with --short)")
     parser.add_argument("--short", action="store_true", help="a glance: seconds instead of minutes")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the result to this file")
     return parser

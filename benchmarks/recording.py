@@ -2,8 +2,8 @@
 
     python -m benchmarks.recording [--rounds N] [--short] [--json FILE]
 
-The contestants split lines and make numbers of the fields that are needed; the loader also judges every line, sorts the
-packets, and counts what it leaves out.
+The implementations split lines and make numbers of the fields that are needed; the loader also judges every line, sorts
+the packets, and counts what it leaves out.
 """
 
 import csv
@@ -45,15 +45,15 @@ def measure(options: Options, console: Console) -> Result:
             "csv and float": lambda: by_csv(path),
             "numpy.loadtxt": lambda: by_numpy(path),
         }
-        same_values(calls)
+        check_same_values(calls)
         times = interleave(calls, options)
         kilobytes = path.stat().st_size / 1000
     lines = [[name, figure(1000 * times.median(name)), figure(kilobytes / 1000 / times.median(name))] for name in calls]
     return Result(
         name="recording",
         title="Reading a recorded track",
-        text=f"A synthetic Bluetooth track of {kilobytes:.0f} kB in the published format. The contestants make numbers"
-        " of the fields needed and look at nothing else.",
+        text=f"A synthetic Bluetooth track of {kilobytes:.0f} kB in the published format. The implementations make"
+        " numbers of the fields needed and look at nothing else.",
         claims=[
             Claim("reading a recorded track", AT_MOST_S, times.median("read_track"), unit="s", at_most=True),
             Claim("the same over csv and float", 4.0, times.ratio("read_track", "csv and float"), at_most=True),
@@ -63,7 +63,7 @@ def measure(options: Options, console: Console) -> Result:
     )
 
 
-def same_values(calls) -> None:
+def check_same_values(calls) -> None:
     """Raise unless all give the same times and levels."""
     track = calls["read_track"]()
     for name in ("csv and float", "numpy.loadtxt"):

@@ -39,7 +39,7 @@ def measure(options: Options, console: Console) -> Result:
     """Train a few times."""
     runs = []
     for _ in range(1 if options.short else min(options.rounds, RUNS)):
-        runs.append(shares(run(SHORT if options.short else [])))
+        runs.append(shares(run_training(SHORT if options.short else [])))
         console.print(f"training: {runs[-1]['environment']:.1f} % in the environment", style="dim")
     environment = statistics.median(one["environment"] for one in runs)
     lines = []
@@ -65,10 +65,10 @@ def shares(seconds: dict) -> dict:
     return seconds | parts | {"rest": 100 - sum(parts.values())}
 
 
-def run(arguments: list[str]) -> dict:
+def run_training(arguments: list[str]) -> dict:
     """Seconds of a training by part, from a process of its own."""
     with tempfile.TemporaryDirectory() as folder:
-        program = "import sys; from benchmarks.training import child; child(sys.argv[1:])"
+        program = "import sys; from benchmarks.training import time_training; time_training(sys.argv[1:])"
         command = [sys.executable, "-c", program, "--runs", folder, "--episodes", "0", *arguments]
         done = subprocess.run(command, cwd=HERE, capture_output=True, text=True)
     if done.returncode:
@@ -81,7 +81,7 @@ def run(arguments: list[str]) -> dict:
     return found
 
 
-def child(arguments: list[str]) -> None:
+def time_training(arguments: list[str]) -> None:
     """In the child: time the pieces, train, print their seconds."""
     import tyro
     from stable_baselines3 import PPO
@@ -95,11 +95,11 @@ def child(arguments: list[str]) -> None:
         settings.steps = ROLLOUTS * settings.rows * settings.rollout
     load_kernels(settings.rows)  # a second of every process, however long it trains
     seconds = {
-        "environment": timed(SB3VecEnv, "step_wait"),
-        "reset": timed(SB3VecEnv, "reset"),
-        "policy": timed(ActorCriticPolicy, "forward", "predict_values"),
-        "update": timed(PPO, "train"),
-        "seconds": timed(PPO, "learn"),
+        "environment": count_seconds(SB3VecEnv, "step_wait"),
+        "reset": count_seconds(SB3VecEnv, "reset"),
+        "policy": count_seconds(ActorCriticPolicy, "forward", "predict_values"),
+        "update": count_seconds(PPO, "train"),
+        "seconds": count_seconds(PPO, "learn"),
     }
     train.train(settings)
     print(json.dumps({name: sum(found) for name, found in seconds.items()} | {"steps": settings.steps}))
@@ -113,7 +113,7 @@ def load_kernels(rows: int) -> None:
     envs.step(np.zeros(rows, np.int64))
 
 
-def timed(kind: type, *names: str) -> list[float]:
+def count_seconds(kind: type, *names: str) -> list[float]:
     """Wall seconds of every call of these methods from now on."""
     found: list[float] = []
 

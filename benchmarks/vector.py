@@ -41,7 +41,7 @@ def measure(options: Options, console: Console) -> Result:
     lines = []
     with one_core():
         for particles, target in TARGETS.items():
-            steps = same_bits(particles)
+            steps = count_equal_steps(particles)
             console.print(f"P = {particles}: both give the same bits for {steps} steps, resets among them")
             times = race(particles, ROWS, options)
             result.claims.append(
@@ -67,7 +67,7 @@ def make(name: str, rows: int, threads: int = 1, **overrides) -> gym.vector.Vect
     return gym.make_vec(ID, num_envs=rows, vectorization_mode=MODES[name], **more, **overrides)
 
 
-def same_bits(particles: int, rows: int = 8, periods: int = 6, steps: int = 20) -> int:
+def count_equal_steps(particles: int, rows: int = 8, periods: int = 6, steps: int = 20) -> int:
     """How many steps were compared: observations, rewards and ends, for random actions, over several short episodes.
 
     Raises:
@@ -75,21 +75,20 @@ def same_bits(particles: int, rows: int = 8, periods: int = 6, steps: int = 20) 
     """
     native, sync = (make(name, rows, particles=particles, periods=periods) for name in MODES)
     rng = np.random.default_rng(0)
-    got, wanted = native.reset(seed=7)[0], sync.reset(seed=7)[0]
-    _equal([got], [wanted], 0)
+    _check_equal([native.reset(seed=7)[0]], [sync.reset(seed=7)[0]], 0)
     for step in range(1, steps + 1):
         actions = rng.integers(native.single_action_space.n, size=rows)
-        _equal(native.step(actions)[:4], sync.step(actions)[:4], step)
+        _check_equal(native.step(actions)[:4], sync.step(actions)[:4], step)
     return steps
 
 
-def _equal(got, wanted, step: int) -> None:
-    if not all(np.array_equal(a, b) for a, b in zip(got, wanted, strict=True)):
+def _check_equal(native, sync, step: int) -> None:
+    if not all(np.array_equal(a, b) for a, b in zip(native, sync, strict=True)):
         raise SystemExit(f"native and SyncVectorEnv differ in step {step}: no race")
 
 
 def race(particles: int, rows: int, options: Options) -> Times:
-    """Seconds a step of a row, by contestant."""
+    """Seconds a step of a row, by implementation."""
     calls = {name: episode(make(name, rows, particles=particles)) for name in MODES}
     return interleave(calls, options, dict.fromkeys(calls, rows * Scenario.named(ID).periods), warm=not options.short)
 
@@ -109,7 +108,7 @@ def episode(envs: gym.vector.VectorEnv) -> Callable[[], None]:
 
 
 def against_rows(options: Options, console: Console) -> dict[str, list[tuple[float, float]]]:
-    """(B, steps/s) by contestant."""
+    """(B, steps/s) by implementation."""
     threads, periods = available_threads(), Scenario.named(ID).periods
     everybody = f"{NATIVE}, {threads} threads"
     lines: dict[str, list[tuple[float, float]]] = {f"{NATIVE}, 1 thread": [], everybody: [], SYNC: []}

@@ -94,13 +94,13 @@ def main() -> int:
     with (
         progress_bar() as report,
         ThreadPoolExecutor(study.workers) as workers,
-        closing(workers.map(lambda job: run(study, job), jobs)) as trained,  # what has not begun never will
+        closing(workers.map(lambda job: train_variant(study, job), jobs)) as trained,  # what has not begun never will
     ):
         for i, job in enumerate(jobs):
             report(i, len(jobs), f"{job.variant}, seed {job.seed}")
             folder = next(trained)
             asked = lams if job.lam is None else (job.lam,)
-            results.setdefault(job.variant, []).append(measured(study, scenario, folder, asked))
+            results.setdefault(job.variant, []).append(evaluate_returns(study, scenario, folder, asked))
             if job.lam is None:
                 folders.setdefault(job.variant, []).append(folder)
     save_table(study.out, scenario, lams, results, USUAL)
@@ -114,7 +114,7 @@ def variants(scenario: Scenario) -> list[str]:
     return [name for name in (*DIFFERENT, ONE_LAM) if name not in own]
 
 
-def run(study: Study, job: Job) -> Path:
+def train_variant(study: Study, job: Job) -> Path:
     """Train, unless that is done."""
     word = "".join(letter if letter.isalnum() else "-" for letter in job.variant) + (f"-{job.lam:g}" if job.lam else "")
     folder = study.out / f"{study.scenario}-{word}-{job.seed}"
@@ -130,7 +130,7 @@ def run(study: Study, job: Job) -> Path:
     return folder
 
 
-def measured(study: Study, scenario: Scenario, folder: Path, lams) -> dict[float, np.ndarray]:
+def evaluate_returns(study: Study, scenario: Scenario, folder: Path, lams) -> dict[float, np.ndarray]:
     """{lam: returns (episodes,)} of a trained policy on the common held-out episodes, kept beside it."""
     path = folder / f"returns-{study.episodes}.json"
     if not path.exists():

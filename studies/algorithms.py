@@ -54,7 +54,14 @@ def make_maskable_ppo(envs, **more):
 
     shape = {"net_arch": [64, 64]}
     return MaskablePPO(
-        "MlpPolicy", envs, n_steps=64, batch_size=4096, n_epochs=8, policy_kwargs=shape, **usual(), **more
+        "MlpPolicy",
+        envs,
+        n_steps=64,
+        batch_size=4096,
+        n_epochs=8,
+        policy_kwargs=shape,
+        **shared_ppo_arguments(),
+        **more,
     )
 
 
@@ -64,11 +71,18 @@ def make_recurrent_ppo(envs, **more):
 
     shape = {"net_arch": [64], "lstm_hidden_size": 64, "enable_critic_lstm": False, "shared_lstm": True}
     return RecurrentPPO(
-        "MlpLstmPolicy", envs, n_steps=64, batch_size=4096, n_epochs=4, policy_kwargs=shape, **usual(), **more
+        "MlpLstmPolicy",
+        envs,
+        n_steps=64,
+        batch_size=4096,
+        n_epochs=4,
+        policy_kwargs=shape,
+        **shared_ppo_arguments(),
+        **more,
     )
 
 
-def usual() -> dict:
+def shared_ppo_arguments() -> dict:
     """What the PPO kinds share with train.py."""
     from stable_baselines3.common.utils import LinearSchedule
 
@@ -111,25 +125,28 @@ def main() -> int:
     results: dict[str, list[dict]] = {}
     for seed in range(study.seeds):
         for name in study.algorithms:
-            results.setdefault(name, []).append(one(study, scenario, name, seed))
+            results.setdefault(name, []).append(train_and_play(study, scenario, name, seed))
     save_table(study.out, scenario, scenario.lam_octaves, results, "")
     return 0
 
 
-def one(study: Study, scenario: Scenario, name: str, seed: int) -> dict[float, np.ndarray]:
+def train_and_play(study: Study, scenario: Scenario, name: str, seed: int) -> dict[float, np.ndarray]:
     """Returns by lam of one training, unless it is done and kept."""
     word = "".join(letter if letter.isalnum() else "-" for letter in name)
     path = study.out / f"{study.scenario}-{word}-{seed}-{study.episodes}.json"
     if not path.exists():
         maker, action = ALGORITHMS[name]
         span = scenario.override(lam=scenario.lam_span)
-        speaks = dict(action=action, observation="menu", order=default_order(scenario))
-        envs = ClusterVectorEnv(ROWS, span, reward="belief", autoreset_mode="Disabled", **speaks)
+        interface = dict(action=action, observation="menu", order=default_order(scenario))
+        envs = ClusterVectorEnv(ROWS, span, reward="belief", autoreset_mode="Disabled", **interface)
         model = maker(SB3VecEnv(TrainingReward(envs, calibrated=True), stagger=True), seed=10**6 * seed, device="cpu")
         started = time.perf_counter()
         model.learn(study.steps)
         seconds = time.perf_counter() - started
-        returns = {lam: play(model, scenario.override(lam=lam), speaks, study.episodes) for lam in scenario.lam_octaves}
+        returns = {
+            lam: play_held_out(model, scenario.override(lam=lam), interface, study.episodes)
+            for lam in scenario.lam_octaves
+        }
         print(
             f"{name}, seed {seed}: {seconds:.0f} s",
             {lam: round(float(values.mean()), 1) for lam, values in returns.items()},
@@ -140,9 +157,9 @@ def one(study: Study, scenario: Scenario, name: str, seed: int) -> dict[float, n
     return {float(lam): np.array(values) for lam, values in kept.items() if lam != "seconds"}
 
 
-def play(model, scenario: Scenario, speaks: dict, episodes: int) -> np.ndarray:
+def play_held_out(model, scenario: Scenario, interface: dict, episodes: int) -> np.ndarray:
     """Returns (episodes,) of the model's likeliest actions on the held-out episodes, by the true error."""
-    envs = ClusterVectorEnv(episodes, scenario, autoreset_mode="Disabled", **speaks)
+    envs = ClusterVectorEnv(episodes, scenario, autoreset_mode="Disabled", **interface)
     masked = type(model).__name__ == "MaskablePPO"
     memory, first = None, np.ones(episodes, bool)
 

@@ -74,7 +74,7 @@ def main() -> int:
         path = asked.out / "calibrations" / f"without_{calibration.left_out}.json"
         calibration.save(path)
         if asked.steps:
-            train(training(asked, calibration.left_out, path))
+            train(training_without(asked, calibration.left_out, path))
     learned = [f"ppo={asked.out}/runs/without_{{track}}/policy.json"] if asked.steps else []
     with progress_bar() as report:
         evaluation = evaluate_recorded(
@@ -94,7 +94,7 @@ def main() -> int:
     return 0
 
 
-def training(asked: Study, left_out: str, calibration: Path) -> Training:
+def training_without(asked: Study, left_out: str, calibration: Path) -> Training:
     """Of the policy that has not seen a track, nor a calibration that has."""
     return Training(
         scenario="Ble-v0",
@@ -117,25 +117,25 @@ def draw_replay(evaluation: RecordedEvaluation, asked: Study, path: Path) -> Non
     name = asked.show if asked.show in evaluation.by_track else next(iter(evaluation.by_track))
     scenario = evaluation.by_track[name].scenario.override(lam=asked.lam[len(asked.lam) // 2])
     policy = f"{asked.out}/runs/without_{name}/policy.json" if asked.steps else "informed3"
-    seen, listened, errors, sds, awake = [], np.zeros(scenario.field.nodes), [], [], []
+    positions, listened, errors, sds, awake = [], np.zeros(scenario.field.nodes), [], [], []
     for state, outcome in episodes(make_policy(policy, scenario), World(scenario), [evaluation.first.rows[0]["seed"]]):
-        seen.append((*outcome.target_m[0], *outcome.estimate_m[0]))
+        positions.append((*outcome.target_m[0], *outcome.estimate_m[0]))
         errors.append(outcome.error_m[0])
         sds.append(outcome.posterior_rms_m[0])
         awake.append(outcome.members[0])
         if state.network.head[0] >= 0:
             listened[state.network.head[0]] += 1
             listened[state.network.members[0, : state.network.n_members[0]]] += 1
-    seen, time = np.array(seen), np.arange(1, len(seen) + 1) * scenario.period_s
+    positions, time = np.array(positions), np.arange(1, len(positions) + 1) * scenario.period_s
     figure, axes = plt.subplot_mosaic([["room", "error"], ["room", "load"]], figsize=(11, 5.6), layout="constrained")
     room, error, load = axes["room"], axes["error"], axes["load"]
     width, depth = scenario.field.room_m
     room.add_patch(plt.Rectangle((0, 0), width, depth, fill=False, color=DARK))
     places = np.array(scenario.field.positions)
-    area = 30 + 500 * listened / len(seen)
+    area = 30 + 500 * listened / len(positions)
     room.scatter(*places.T, s=area, color=SKY, label="receiver; area: how often it listened")
-    room.plot(*seen[:, :2].T, color=DARK, linewidth=2.5, label="recorded way")
-    room.plot(*seen[:, 2:].T, color=VERMILION, linewidth=1.2, marker=".", markersize=4, label="estimate")
+    room.plot(*positions[:, :2].T, color=DARK, linewidth=2.5, label="recorded way")
+    room.plot(*positions[:, 2:].T, color=VERMILION, linewidth=1.2, marker=".", markersize=4, label="estimate")
     room.set(aspect="equal", xlabel="x [m]", ylabel="y [m]", title=f"{name}, lam = {scenario.lam:g} m/mJ")
     room.set_ylim(-4.5, depth + 1)
     room.legend(loc="lower center", frameon=False, ncols=2, fontsize=9, markerscale=0.4)

@@ -57,7 +57,7 @@ def main() -> int:
     """Run."""
     asked = tyro.cli(Comparison, description=__doc__)
     scenario = make_scenario(asked.scenario, asked.set, asked.tracks)
-    trained = load(asked.policies, scenario)
+    trained = load_trained(asked.policies, scenario)
     rules = asked.rules or [name for name in policy_names() if name not in SLOW]
     policies = trained | {name: make_policy(name, scenario) for name in rules}
     lams = asked.lam or scenario.lam_octaves
@@ -65,7 +65,7 @@ def main() -> int:
         evaluation = evaluate(policies, scenario, lams, asked.episodes, asked.seed, keep=asked.out, progress=report)
     evaluation.save(asked.out)
     text = "\n".join(
-        [table(evaluation, list(trained)), bounds(evaluation, list(trained)), volumes(evaluation, trained)]
+        [table(evaluation, list(trained)), list_bounds(evaluation, list(trained)), list_volumes(evaluation, trained)]
     )
     with replacing(asked.out / "seeds.md") as path:
         path.write_text(text)
@@ -74,7 +74,7 @@ def main() -> int:
     return 0
 
 
-def load(paths: list[Path], scenario: Scenario) -> dict[str, PPOPolicy]:
+def load_trained(paths: list[Path], scenario: Scenario) -> dict[str, PPOPolicy]:
     """ppo0, ppo1, ... from folders of runs, or from their policy.json."""
     files = [path / "policy.json" if path.is_dir() else path for path in paths]
     return {f"ppo{i}": PPOPolicy(scenario, path=str(file)) for i, file in enumerate(files)}
@@ -99,7 +99,7 @@ def best_of(evaluation: Evaluation, names: list[str], lam: float) -> str:
     return max(names, key=lambda name: evaluation.values(name, lam, "return").mean())
 
 
-def ahead_of(evaluation: Evaluation, trained: list[str], rule: str, lam: float) -> str:
+def format_advantage(evaluation: Evaluation, trained: list[str], rule: str, lam: float) -> str:
     """What the trainings' mean has over a rule, in percent of the rule's return."""
     theirs = evaluation.values(rule, lam, "return")
     ahead = Summary.of(returns(evaluation, trained, lam).mean(axis=0) - theirs)
@@ -123,13 +123,13 @@ def table(evaluation: Evaluation, trained: list[str]) -> str:
             best = best_of(evaluation, names, lam)
             theirs = evaluation.values(best, lam, "return").mean()
             which = f"{split_number(best)[1]}: " if len(names) > 1 else ""
-            cells.append(f"{which}{theirs:.1f} ({ahead_of(evaluation, trained, best, lam)})")
+            cells.append(f"{which}{theirs:.1f} ({format_advantage(evaluation, trained, best, lam)})")
         label = f"best of {stem}0..{split_number(names[-1])[1]}" if len(names) > 1 else stem
         lines.append(f"| {label} | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
 
-def bounds(evaluation: Evaluation, trained: list[str]) -> str:
+def list_bounds(evaluation: Evaluation, trained: list[str]) -> str:
     """RMS over the bound at the middle lam."""
     lam = evaluation.lams[len(evaluation.lams) // 2]
     lines = [f"RMS error over the bound of its own schedule, lam = {lam:g}:", ""]
@@ -140,7 +140,7 @@ def bounds(evaluation: Evaluation, trained: list[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def volumes(evaluation: Evaluation, trained) -> str:
+def list_volumes(evaluation: Evaluation, trained) -> str:
     """Hypervolume of the union of all rules, and of each training's front with the paired difference to it."""
     reference = reference_point(evaluation.scenario)
     by_policy = {name: policy_points(evaluation, name) for name in evaluation.policies}

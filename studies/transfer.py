@@ -14,7 +14,7 @@ from pathlib import Path
 
 import tyro
 
-from studies.seeds import ahead_of, best_of, load, returns
+from studies.seeds import best_of, format_advantage, load_trained, returns
 from wsn_env.cli import make_scenario
 from wsn_env.evaluation.comparison import Evaluation, evaluate
 from wsn_env.evaluation.files import replacing
@@ -55,24 +55,24 @@ def main() -> int:
     lams = asked.lam or usual.lam_octaves
     lines = ["| world | " + " | ".join(f"{lam:g}" for lam in lams) + " |", "|---" + "|--:" * len(lams) + "|"]
     for i, (what, scenario) in enumerate(scenarios.items(), 1):
-        trained = load(asked.policies, scenario)
+        trained = load_trained(asked.policies, scenario)
         policies = trained | {name: make_policy(name, scenario) for name in SIZES}
-        keep = folder_of(asked, worlds[what])
+        keep = world_folder(asked, worlds[what])
         print(f"{i} of {len(scenarios)}: {what}", file=sys.stderr)
         with progress_bar() as report:
             evaluation = evaluate(policies, scenario, lams, asked.episodes, asked.seed, keep=keep, progress=report)
         evaluation.save(keep)
-        lines.append(f"| {what} | " + " | ".join(cells(evaluation, list(trained))) + " |")
+        lines.append(f"| {what} | " + " | ".join(format_cells(evaluation, list(trained))) + " |")
     text = "\n".join(lines) + "\n"
     with replacing(asked.out / f"{usual.name}.md") as path:
         path.write_text(text)
     for settings in worlds.values():
-        remove_kept_blocks(folder_of(asked, settings))
+        remove_kept_blocks(world_folder(asked, settings))
     print(text)
     return 0
 
 
-def folder_of(asked: Transfer, settings: str) -> Path:
+def world_folder(asked: Transfer, settings: str) -> Path:
     """Of one world's rows."""
     return asked.out / f"{asked.scenario}-{settings.replace(' ', '-')}"
 
@@ -96,12 +96,14 @@ def worlds_of(scenario: Scenario) -> dict[str, str]:
     }
 
 
-def cells(evaluation: Evaluation, trained: list[str]) -> list[str]:
+def format_cells(evaluation: Evaluation, trained: list[str]) -> list[str]:
     """At each lam the trainings' mean return, and what it has over the best size."""
     found = []
     for lam in evaluation.lams:
         best = best_of(evaluation, SIZES, lam)
-        found.append(f"{returns(evaluation, trained, lam).mean():.1f} ({ahead_of(evaluation, trained, best, lam)})")
+        found.append(
+            f"{returns(evaluation, trained, lam).mean():.1f} ({format_advantage(evaluation, trained, best, lam)})"
+        )
     return found
 
 

@@ -71,11 +71,11 @@ class Trials:
         played_lams = [self.lams[0]] * len(policies) if played_at is None else played_at
         rows = []
         for done, (policy, lam) in enumerate(zip(policies, played_lams, strict=True)):
-            rows.append(self._play(policy, float(lam)))
+            rows.append(self._play_once(policy, float(lam)))
             self._progress(done + 1, len(policies), f"{self.scenario.name}, {what}")
         return np.array(rows)
 
-    def _play(self, policy: Policy, lam: float) -> np.ndarray:
+    def _play_once(self, policy: Policy, lam: float) -> np.ndarray:
         key = f"{policy!r} {lam}"
         if key not in self._costs:
             world = World(self.scenario.override(lam=lam), threads=1)

@@ -1,4 +1,4 @@
-"""The contestants compute the same, and their results become a page. (Nothing here looks at a clock.)"""
+"""The implementations compute the same, and their results become a page. (Nothing here looks at a clock.)"""
 
 import subprocess
 import sys
@@ -9,12 +9,21 @@ from rich.console import Console
 
 from benchmarks import __main__ as suite
 from benchmarks import environment, filter_scaling, filter_step, page, plots, race
-from benchmarks.filters import CONTESTANTS, SLOW_STARTERS, Absent, Contestant, Problem, agreement, enter, kind_of
+from benchmarks.filters import (
+    IMPLEMENTATIONS,
+    SLOW_STARTERS,
+    Absent,
+    Implementation,
+    Problem,
+    agreement,
+    enter,
+    kind_of,
+)
 from benchmarks.filters.exact import estimates
 from benchmarks.filters.textbook import ParticleFilter
 
 MEASUREMENTS = ("position", "rssi")
-NAMES = [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW_STARTERS)) for name in CONTESTANTS]
+NAMES = [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW_STARTERS)) for name in IMPLEMENTATIONS]
 
 
 def skipping_absent(function, *arguments, **keywords):
@@ -59,9 +68,9 @@ def test_the_check_is_the_same_every_time():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_contestant_steps_and_starts_over(name):
-    contestant = skipping_absent(enter, name, Problem.draw("position", particles=200, rows=2))
-    means, covs, n_eff = estimates(contestant, periods=22)
+def test_every_implementation_steps_and_starts_over(name):
+    implementation = skipping_absent(enter, name, Problem.draw("position", particles=200, rows=2))
+    means, covs, n_eff = estimates(implementation, periods=22)
     assert means.shape == (22, 2, 4) and covs.shape == (22, 2, 4, 4) and n_eff.shape == (22, 2)
     assert np.isfinite(means).all() and (n_eff > 1).all() and (n_eff <= 200.1).all()
 
@@ -83,21 +92,21 @@ def test_fast_c_leaves_the_process_its_denormals():
     assert np.full(3, 1e-310)[1] * 0.5 > 0.0
 
 
-def test_a_contestant_that_is_not_here_is_skipped_by_name(monkeypatch):
-    monkeypatch.setitem(CONTESTANTS, "nobody", ("nobody", "Nobody"))
-    figures, absent = agreement.check(["nobody"], "position")
+def test_an_implementation_that_is_not_here_is_skipped_by_name(monkeypatch):
+    monkeypatch.setitem(IMPLEMENTATIONS, "nobody", ("nobody", "Nobody"))
+    figures, absent = agreement.check_agreement(["nobody"], "position")
     assert figures == {} and "nobody" in absent["nobody"]
 
 
 def test_another_posterior_is_not_raced(monkeypatch):
     monkeypatch.setattr(kind_of("NumPy f64, textbook").kind, "estimate", lambda self: (np.zeros(4), np.eye(4)))
     with pytest.raises(SystemExit, match="textbook does not compute the same posterior"):
-        agreement.check(["NumPy f64, textbook"], "position")
+        agreement.check_agreement(["NumPy f64, textbook"], "position")
 
 
 def test_the_protocol_is_abstract():
     with pytest.raises(NotImplementedError):
-        Contestant(Problem.draw(particles=10))
+        Implementation(Problem.draw(particles=10))
 
 
 # --- the environments ---------------------------------------------------------------------------------------
@@ -110,7 +119,7 @@ def test_the_naive_environment_has_the_same_episodes():
 
 
 def test_every_environment_steps():
-    field, skipped = environment.contestants()
+    field, skipped = environment.implementations()
     assert len(field) + len(skipped) == len(environment.LABELS)
     for call, steps in field.values():
         assert steps in (1, environment.ROWS)
@@ -120,7 +129,7 @@ def test_every_environment_steps():
 # --- the harness --------------------------------------------------------------------------------------------
 
 
-def test_contestants_have_turns_in_every_round():
+def test_implementations_have_turns_in_every_round():
     order, now = [], iter(range(1000))
     calls = {name: lambda name=name: order.append(name) for name in "ab"}
     times = race.interleave(calls, race.Options(rounds=3), {"b": 2}, clock=lambda: next(now), warm=False)
@@ -139,17 +148,17 @@ def test_the_claims_verdicts():
 def test_the_line_is_found():
     sizes = [(p, rows) for p in (500, 5000) for rows in (10, 100)]
     grid = {(p, rows): 3e-6 + 5e-9 * p * rows for p, rows in sizes}
-    assert filter_scaling.fit(grid) == pytest.approx((3e-6, 5e-9))
+    assert filter_scaling.fit_line(grid) == pytest.approx((3e-6, 5e-9))
 
 
 @pytest.fixture
 def few(monkeypatch):
-    """Claims without the slower contestants."""
+    """Claims without the slower implementations."""
     names = ("wsn_env, strict", "wsn_env, fast", "NumPy f32, tuned")
-    chosen = {name: CONTESTANTS[name] for name in names} | {"nobody": ("nobody", "Nobody")}
-    monkeypatch.setattr(filter_step, "CONTESTANTS", chosen)
+    chosen = {name: IMPLEMENTATIONS[name] for name in names} | {"nobody": ("nobody", "Nobody")}
+    monkeypatch.setattr(filter_step, "IMPLEMENTATIONS", chosen)
     monkeypatch.setattr(filter_scaling, "RACED", list(chosen))
-    monkeypatch.setitem(CONTESTANTS, "nobody", chosen["nobody"])
+    monkeypatch.setitem(IMPLEMENTATIONS, "nobody", chosen["nobody"])
     monkeypatch.setattr(filter_scaling, "SHORT_LIMIT", 8000)
     monkeypatch.setattr(race, "SHORT_TURN_S", 0.0)
 
@@ -167,16 +176,18 @@ def test_a_short_run_becomes_a_page_that_renews_itself(claim, few, tmp_path):
     result.save(folder / f"{result.name}.json")
     assert race.Result.load(folder / f"{result.name}.json").claims == result.claims
     text.write_text(page.PAGE.read_text())
-    page.renew(folder, text)
+    page.renew_page(folder, text)
     first = text.read_text(), [path.read_bytes() for path in sorted(tmp_path.glob("*.svg"))]
     assert result.tables[0].title in first[0] and len(first[1]) == len(result.plots)
-    page.renew(folder, text)
+    page.renew_page(folder, text)
     assert (text.read_text(), [path.read_bytes() for path in sorted(tmp_path.glob("*.svg"))]) == first
 
 
 def test_claims_that_differ_in_their_case_are_one_line_with_the_worst():
     cases = [race.Claim("faster", 5.0, value, case=case) for case, value in {"a": 7.0, "b": 4.0, "c": None}.items()]
-    table = page.targets([race.Result("speed", "Speed", claims=[*cases, race.Claim("flat", 2.0, 1.0, at_most=True)])])
+    table = page.table_of_targets(
+        [race.Result("speed", "Speed", claims=[*cases, race.Claim("flat", 2.0, 1.0, at_most=True)])]
+    )
     assert "| faster | >= 5x | 4x | b (best of 2: 7x) | **missed, 1 not measured** |\n| flat | <= 2x | 1x |" in table
 
 
@@ -192,20 +203,20 @@ def test_whole_environments_are_lines_beside_the_filters():
         "env_rows", "Environments", "rows B", "environment steps/s", {"vector environment": [(1, 1.0)]}
     )
     results = [race.Result("vector", "", plots=[environments]), race.Result("filter_scaling", "", plots=[filters])]
-    assert [*page.plots(results)["rows"].lines] == ["ours", "vector environment"]
+    assert [*page.make_plots(results)["rows"].lines] == ["ours", "vector environment"]
 
 
 def test_a_claim_without_a_place_of_its_own_stands_under_further():
     text = "# Title\n<!-- begin further -->\nold\n<!-- end further -->\nprose\n"
     facts = {"processor": "a", "cores": 2, "l2_bytes": 2**20, "python": "3", "system": "b", "packages": {}}
     table = race.Table("Cost", ["nodes", "us"], [["225", "3"]])
-    new = page.rendered(text, [race.Result("nodes", "Nodes", tables=[table], machine=facts)])
+    new = page.fill_blocks(text, [race.Result("nodes", "Nodes", tables=[table], machine=facts)])
     assert "old" not in new and new.endswith("prose\n")
     assert "## Nodes\n\nCost:\n\n| nodes | us |\n| --- | --: |\n| 225 | 3 |\n" in new
 
 
 def test_labels_keep_their_distance():
-    assert plots._apart([0.0, 0.1, 5.0], 1.0) == pytest.approx([-0.45, 0.55, 5.0])
+    assert plots._move_apart([0.0, 0.1, 5.0], 1.0) == pytest.approx([-0.45, 0.55, 5.0])
 
 
 def test_a_failing_claim_does_not_stop_the_others(monkeypatch, tmp_path):

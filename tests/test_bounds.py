@@ -23,7 +23,7 @@ PLAIN = dict(particles=50)
 
 
 def played(scenario, rows=5, seed=3, policy="random", threads=1):
-    """Bounds of every period (periods + 1, B), the episodes' and the floor's (B,), the states on the way."""
+    """Bounds of every period (periods + 1, B), the episodes' and with all nodes awake (B,), the states on the way."""
     bound, told, states = Bound(scenario, rows, threads), [], []
     world = World(scenario, threads=1)
     for state, outcome in episodes(
@@ -31,7 +31,7 @@ def played(scenario, rows=5, seed=3, policy="random", threads=1):
     ):
         told.append(bound.advance(state, outcome))
         states.append((state.copy(), outcome))
-    return np.array(told), bound.episode_m(), bound.floor_m(state), states
+    return np.array(told), bound.episode_m(), bound.bound_all_awake_m(state), states
 
 
 def by_information(scenario, states, row, q, start_sds):
@@ -97,19 +97,19 @@ def test_a_first_search_counts():
 
 @pytest.mark.parametrize("name", ["PreDC-v0", "Rssi-v0", "Anchors-v0", "Underwater-v0"])
 @pytest.mark.parametrize("more", [{}, dict(start="search", packet_success=0.6)])
-def test_no_schedule_is_below_the_floor(name, more):
-    """Information adds, episode by episode; and the floor is the same whatever was done."""
+def test_no_schedule_is_below_the_bound_with_all_nodes_awake(name, more):
+    """Information adds, episode by episode; and the bound with all nodes awake is the same whatever was done."""
     if name == "Underwater-v0":
         more = {key: value for key, value in more.items() if key == "start"}
     scenario = Scenario.named(name, **PLAIN, periods=30, **more)
-    floors = []
+    all_awake = []
     for policy in ("random", "nearest0", "all"):
-        _, episode_m, floor_m, _ = played(scenario, rows=8, policy=policy)
-        assert (floor_m <= episode_m * (1 + 1e-12)).all()
-        floors.append(floor_m)
-    assert (floors[0] == floors[1]).all() and (floors[0] == floors[2]).all()
-    if name != "Underwater-v0" and not more:  # everybody awake, nothing lost: that is the floor
-        np.testing.assert_allclose(episode_m, floor_m, rtol=1e-12)
+        _, episode_m, all_awake_m, _ = played(scenario, rows=8, policy=policy)
+        assert (all_awake_m <= episode_m * (1 + 1e-12)).all()
+        all_awake.append(all_awake_m)
+    assert (all_awake[0] == all_awake[1]).all() and (all_awake[0] == all_awake[2]).all()
+    if name != "Underwater-v0" and not more:  # everybody awake, nothing lost: that is the bound with all nodes awake
+        np.testing.assert_allclose(episode_m, all_awake_m, rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["PreDC-v0", "Rssi-v0", "Anchors-v0"])
@@ -156,7 +156,9 @@ def test_kinds(name, overrides, kind):
     env.step(10)
     *_, last = env.step(10)
     assert ("bound_m" in first, "bound_m" in last) == (kind != "none",) * 2
-    assert ("episode_bound_m" in last) == (kind != "none") and ("episode_floor_m" in last) == (kind == "bound")
+    assert ("episode_bound_m" in last) == (kind != "none") and ("episode_bound_all_awake_m" in last) == (
+        kind == "bound"
+    )
     if kind == "none":
         with pytest.raises(ValueError, match="Binary"):
             Bound(scenario)
@@ -182,7 +184,7 @@ def test_rows_stand_alone(name):
             heads, members = choices(0, period, 700, scenario.field.nodes)
             state, outcome = world.step(state, type(choices(0, 0, 1, 2))(heads[pick], members[pick]), donate=True)
             told.append(bound.advance(state, outcome))
-        return np.array([*told, bound.episode_m(), bound.floor_m(state)])
+        return np.array([*told, bound.episode_m(), bound.bound_all_awake_m(state)])
 
     batch = run(keys, np.arange(700))
     assert (batch == run(keys, np.arange(700), threads=2)).all()
@@ -203,7 +205,7 @@ def test_infos_of_vector_and_single_agree(name, mode):
         *_, infos = envs.step(np.full(3, 12))
         *_, info = env.step(12)
     last = infos["final_info"] if mode == "SameStep" else infos
-    for key in ("bound_m", "episode_bound_m", "episode_floor_m"):
+    for key in ("bound_m", "episode_bound_m", "episode_bound_all_awake_m"):
         assert (key in last) == (key in info)
         assert key not in info or last[key][1] == info[key]
     again = env.reset()[1]
@@ -259,7 +261,7 @@ def test_tables_say_what_it_is(name, column, words, tmp_path, capsys):
     assert words in " ".join(capsys.readouterr().out.split())
     write_picture(tmp_path / "front.png", draw_comparison(evaluation, evaluation.lams[0]))
     row = evaluation.rows[0]
-    assert (row["bound_m"] == "") == (row["floor_m"] == "") == (column is None)
+    assert (row["bound_m"] == "") == (row["bound_all_awake_m"] == "") == (column is None)
     if column:
         ratio = evaluation.rms_over_bound("nearest2", evaluation.lams[0])
         rms, bound = (evaluation.values("nearest2", evaluation.lams[0], key) for key in ("rms_m", "bound_m"))

@@ -12,7 +12,7 @@ from wsn_env.bluetooth.calibration import Calibration, CalibrationError
 from wsn_env.bluetooth.covariance import Autocovariance, bias_covariance, fit_bias
 from wsn_env.bluetooth.fitting import calibrate, fit_mixture, fit_path_loss, leave_one_out
 from wsn_env.bluetooth.losses import advertisements, measure_losses
-from wsn_env.bluetooth.packets import concatenate_tracks, hold_out, residuals
+from wsn_env.bluetooth.packets import concatenate_tracks, held_out_residuals, residuals
 from wsn_env.bluetooth.residual_map import CELL_M, residual_map, save_map
 from wsn_env.cli import Calibrate, run_calibrate
 from wsn_env.models.quantity import ScenarioError
@@ -425,5 +425,5 @@ def test_the_recorded_tracks_one_by_one(recorded):
     white = [4.495, 4.500, 4.473, 4.490, 4.538, 4.503]
     assert [part.bias_db for part in parts] == pytest.approx(bias, abs=0.002)
     assert [part.white_db for part in parts] == pytest.approx(white, abs=0.002)
-    held = hold_out(recorded, calibrate(recorded), parts)
+    held = held_out_residuals(recorded, calibrate(recorded), parts)
     assert held.residual_db.std() == pytest.approx(5.26, abs=0.05)

@@ -144,10 +144,10 @@ def test_a_draw_is_a_function_of_its_key():
 
 
 def test_policies_draw_alike_in_every_batch():
-    luck = np.array([3, 2**32 - 1, 0, 77], np.uint32)
-    together = draws.uniforms(luck, 6)
+    seeds = np.array([3, 2**32 - 1, 0, 77], np.uint32)
+    together = draws.uniforms(seeds, 6)
     for b in range(4):
-        np.testing.assert_array_equal(draws.uniforms(luck[b : b + 1], 6), together[b : b + 1])
+        np.testing.assert_array_equal(draws.uniforms(seeds[b : b + 1], 6), together[b : b + 1])
     assert ((together >= 0) & (together < 1)).all() and len(np.unique(together)) == together.size
 
 

@@ -25,12 +25,12 @@ def whole(result, claims: int):
 
 
 def test_native_and_sync_give_the_same_bits():
-    assert vector.same_bits(particles=300, rows=3, periods=4, steps=12) == 12
+    assert vector.count_equal_steps(particles=300, rows=3, periods=4, steps=12) == 12
 
 
 def test_a_difference_stops_the_race():
     with pytest.raises(SystemExit):
-        vector._equal([np.zeros(2)], [np.ones(2)], 1)
+        vector._check_equal([np.zeros(2)], [np.ones(2)], 1)
 
 
 def test_vector(monkeypatch):

@@ -174,7 +174,7 @@ def test_pareto_prints_tables_and_writes_files(tmp_path, capsys):
     small = ["--set", *(f"{name}={value}" for name, value in SMALL.items())]
     assert main([*command, "--out", str(tmp_path), *small]) == 0
     printed = capsys.readouterr().out
-    assert "lam = 0.3 to 30 m/mJ, 3 paired episodes" in printed and "pre_dc minus it" in printed
+    assert "lam = 0.3 to 30 m/mJ, 3 paired episodes" in printed and "pre_dc - front" in printed
     assert "nearest0..1" in printed and OTHERS in printed and "1.5 m and 0.4 mJ" in printed
     names = {f"evaluation.{kind}" for kind in ("csv", "json", "md")} | {f"front.{k}" for k in ("csv", "json", "png")}
     names.add("report.html")

@@ -103,7 +103,7 @@ def test_what_happens_does_not_depend_on_the_choice(scenario, seed):
         everybody, whole = world.step(everybody, awake)
         np.testing.assert_array_equal(state.track, everybody.track)
         np.testing.assert_array_equal(outcome.target_m, whole.target_m)
-        np.testing.assert_array_equal(state.row["luck"], everybody.row["luck"])
+        np.testing.assert_array_equal(state.row["random_bits"], everybody.row["random_bits"])
         np.testing.assert_array_equal(state.row["lam"], everybody.row["lam"])
         np.testing.assert_array_equal(state.network.positions, everybody.network.positions)
         for row in range(4):
@@ -233,7 +233,7 @@ def test_batteries_lose_what_the_outcome_reports(scenario, seed):
 
 @law(90)
 @given(scenarios(start="search"), SEEDS)
-def test_the_first_search_is_on_the_books(scenario, seed):
+def test_the_first_search_is_charged(scenario, seed):
     world, keys = World(scenario, threads=1), keys_of(seed, 4)
     state, outcome = world.restart(world.reset(keys), np.ones(4, bool), keys)
     spent = scenario.radio.battery_j - state.network.battery

@@ -14,8 +14,6 @@ PACKAGES = (  # of wsn_env, from the bottom up
 ON_TOP = ("train", "benchmarks", "studies", "examples")  # beside wsn_env, in the same order
 FROM_ENVS_UP = {"gymnasium", "stable_baselines3", "torch"}
 TOP_LEVEL_ENTRIES = 15
-UPWARD: dict[str, str] = {}  # packages that still import from above
-LOGIC: dict[str, str] = {}  # packages whose __init__ still holds some
 
 ROOT = Path(__file__).parents[1]
 LAYERS = {name: height for height, name in enumerate((*PACKAGES, *ON_TOP))}
@@ -71,13 +69,7 @@ def offending(wrong, layers=LAYERS) -> list[str]:
     return [f"{path.relative_to(ROOT)}: {name}" for path, name in found if wrong(name)]
 
 
-def each(names, unfinished):
-    """As parameters of a test, of which the unfinished ones have to fail."""
-    marks = {name: pytest.mark.xfail(reason=reason, strict=True) for name, reason in unfinished.items()}
-    return [pytest.param(name, marks=marks.get(name, ())) for name in names]
-
-
-@pytest.mark.parametrize("layer", each(LAYERS, UPWARD))
+@pytest.mark.parametrize("layer", LAYERS)
 def test_imports_go_down(layer):
     assert not offending(lambda name: LAYERS.get(layer_of_import(name), 0) > LAYERS[layer], [layer])
 
@@ -112,7 +104,7 @@ def test_the_top_level_of_the_package_is_a_short_list():
     assert 0 < len(entries) <= TOP_LEVEL_ENTRIES, sorted(entries)
 
 
-@pytest.mark.parametrize("layer", each([name for name in PACKAGES if name != "cli"], LOGIC))
+@pytest.mark.parametrize("layer", [name for name in PACKAGES if name != "cli"])
 def test_init_files_hand_names_on_and_hold_no_logic(layer):
     """A docstring, imports, `__all__`. The front door alone does more: it loads names when they are first used."""
     paths = [path for path in FILES if path.name == "__init__.py" and layer_of_file(path) == layer]

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from wsn_env.learning.actor_critic import EntryActorCritic
-from wsn_env.learning.network import EntryNetwork, FlatNetwork, Network
+from wsn_env.learning.network import EntryNetwork, FlatNetwork, PolicyNetwork
 
 BELIEF, ENTRY = 7, 5
 
@@ -28,14 +28,14 @@ def test_numpy_and_torch_agree(outputs):
     given = observations(6)
     with torch.no_grad():
         wanted = twin(torch.as_tensor(given))[0].numpy()
-    found = twin.network().logits(given)
+    found = twin.actor_network().logits(given)
     assert found.shape == wanted.shape == (33, 6 if outputs == 1 else 1 + 6 + 2 * 6)
     assert np.allclose(found, wanted, rtol=1e-4, atol=1e-4)
-    assert (found == np.concatenate([twin.network().logits(row[None]) for row in given])).all()
+    assert (found == np.concatenate([twin.actor_network().logits(row[None]) for row in given])).all()
 
 
 def test_an_entry_has_the_same_logit_wherever_it_stands_and_whatever_else_there_is():
-    network = actor(1).network()
+    network = actor(1).actor_network()
     given = observations(6)
     entries = given[:, BELIEF:].reshape(33, 6, ENTRY)
     turned = np.concatenate([given[:, :BELIEF], entries[:, ::-1].reshape(33, -1)], axis=1)
@@ -45,7 +45,7 @@ def test_an_entry_has_the_same_logit_wherever_it_stands_and_whatever_else_there_
 
 
 def test_a_candidate_too():
-    network = actor(2).network()
+    network = actor(2).actor_network()
     many, few = observations(6), None
     few = many[:, : BELIEF + 4 * ENTRY]
     ours, theirs = network.logits(few), network.logits(many)
@@ -60,9 +60,9 @@ def test_files_tell_the_kinds_apart(tmp_path):
     rng = np.random.default_rng(2)
     sizes = dict(observation=6, first=4, second=3, logits=2)
     flat = FlatNetwork({name: rng.normal(size=[sizes[a] for a in axes]) for name, axes in FlatNetwork.SHAPES.items()})
-    for network in (flat, actor(1).network()):
+    for network in (flat, actor(1).actor_network()):
         network.save(tmp_path / "policy.safetensors")
-        again = Network.load(tmp_path / "policy.safetensors")
+        again = PolicyNetwork.load(tmp_path / "policy.safetensors")
         assert type(again) is type(network)
         assert all((again.arrays[name] == array).all() for name, array in network.arrays.items())
     with pytest.raises(ValueError, match="does not fit"):

@@ -7,7 +7,7 @@ from studies.planning import main
 from tests.test_policies import SCENARIO, chosen, walked
 from tests.worlds import assert_same, expected, expected_gain
 from wsn_env import Scenario, View, World, evaluate
-from wsn_env.agents.imagined import GaussianTracker, draw_worlds, imagined_world, place_nodes, rows_of
+from wsn_env.agents.imagined import GaussianTracker, draw_worlds, imagined_world, place_nodes, take_rows
 from wsn_env.agents.nearest import ORDERS, Nearest
 from wsn_env.agents.planner import Planner
 from wsn_env.compiled import draws
@@ -20,7 +20,7 @@ QUICK = dict(horizon=3, worlds=12)
 
 
 def some_rows(scenario=SCENARIO, rows=4, lam=4.0):
-    state = rows_of(walked(9, scenario), slice(rows)).copy()
+    state = take_rows(walked(9, scenario), slice(rows)).copy()
     state.row["lam"] = lam
     return state
 
@@ -46,8 +46,8 @@ def test_rows_are_planned_alike_in_any_batch_and_again(scenario):
     planner = Planner(scenario, **QUICK)
     together = clusters(planner.act(view))
     assert clusters(planner.act(view)) == clusters(Planner(scenario, **QUICK).act(view)) == together
-    backwards = clusters(planner.act(rows_of(view, np.arange(4)[::-1])))
-    alone = [clusters(planner.act(rows_of(view, slice(row, row + 1))))[0] for row in range(4)]
+    backwards = clusters(planner.act(take_rows(view, np.arange(4)[::-1])))
+    alone = [clusters(planner.act(take_rows(view, slice(row, row + 1))))[0] for row in range(4)]
     assert alone == together == backwards[::-1]
     assert clusters(planner.act(View.from_arrays(view.as_arrays()))) == together
 
@@ -172,7 +172,7 @@ def test_it_is_no_worse_than_the_best_fixed_cluster_in_hindsight():
 
 
 def drawn(scenario, particles=0, periods=3, count=2000, choices=1):
-    view = rows_of(View.of(some_rows(scenario)), slice(1))
+    view = take_rows(View.of(some_rows(scenario)), slice(1))
     world = imagined_world(scenario, periods, particles)
     state = world.allocate(count * choices)
     place_nodes(state, view)

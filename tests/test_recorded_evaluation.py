@@ -188,7 +188,7 @@ def test_what_cannot_be_compared_is_said(folder, tmp_path, capsys):
 def test_the_published_tracks_give_the_figures_of_the_study():
     """Mean of the six tracks' RMS over ten filter seeds, each calibrated on the other five.
 
-    The standard errors over seeds are .01 (all) to .05 m (informed1, whose luck in the first seconds varies).
+    The standard errors over seeds are .01 (all) to .05 m (informed1, whose first seconds differ between seeds).
     """
     folder = os.environ.get("WSN_BLE_DIR") or pytest.skip("WSN_BLE_DIR names no recordings")
     policies = ["all", "informed5", "informed3", "informed2", "informed1", "quadrants:n=2", "nearest2"]

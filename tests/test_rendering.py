@@ -134,7 +134,7 @@ def test_rows_of_a_batch_look_like_environments_of_their_own():
     env.reset()
     env.step(14)
     assert (frames[1] == env.render()).all()
-    picture = camera.tiled(frames)
+    picture = camera.tile_frames(frames)
     assert picture.shape == (402, 402, 3) and (picture[:200, 202:] == frames[1]).all()
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from wsn_env.papers import reproduce
-from wsn_env.papers.claim import HOLDS, NOT_REPRODUCED, UNDER_READING, Expectation, print_expected, verdict
+from wsn_env.papers.claim import HOLDS, NOT_REPRODUCED, UNDER_READING, Expectation, judge_claim, print_expected
 from wsn_env.papers.pre_dc.claims import EXPECTED_RMS_M, PAPER_RMS_M, exceeds
 from wsn_env.papers.pre_dc.systems import NODES, SYSTEMS, motion_trial, scenario_as_read
 from wsn_env.papers.rollout import Trial, play, play_all, standard_error
@@ -130,9 +130,9 @@ def test_a_trial_named_twice_is_played_once():
 
 
 def test_verdicts():
-    assert verdict(plainly=True, under_reading=True) == HOLDS
-    assert verdict(plainly=False, under_reading=True) == UNDER_READING
-    assert verdict(plainly=True, under_reading=False) == NOT_REPRODUCED
+    assert judge_claim(plainly=True, under_reading=True) == HOLDS
+    assert judge_claim(plainly=False, under_reading=True) == UNDER_READING
+    assert judge_claim(plainly=True, under_reading=False) == NOT_REPRODUCED
 
 
 def test_a_difference_within_the_noise_does_not_count():

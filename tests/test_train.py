@@ -15,8 +15,8 @@ import train
 from wsn_env import ClusterVectorEnv, Scenario, View, evaluate, make_policy
 from wsn_env.agents.ppo import PPOPolicy
 from wsn_env.cli import parse_overrides
-from wsn_env.learning.actor_critic import network_of
-from wsn_env.learning.network import EntryNetwork, Network
+from wsn_env.learning.actor_critic import actor_network
+from wsn_env.learning.network import EntryNetwork, PolicyNetwork
 
 SET = ["particles=50", "nodes=40", "side_m=50", "crossing_m=20", "periods=10"]
 SHORT = dict(steps=4096, rows=32, rollout=32, batch=512, epochs=2, episodes=60, checkpoint_steps=1024, set=SET)
@@ -46,8 +46,8 @@ def test_the_saved_policy_is_the_trained_one_without_torch(run):
     from stable_baselines3 import PPO
 
     model = PPO.load(run / "checkpoint.zip")
-    network = Network.load(run / "policy.safetensors")
-    assert all(np.array_equal(array, network_of(model).arrays[name]) for name, array in network.arrays.items())
+    network = PolicyNetwork.load(run / "policy.safetensors")
+    assert all(np.array_equal(array, actor_network(model).arrays[name]) for name, array in network.arrays.items())
     scenario = Scenario.named("PreDC-v0", **parse_overrides(SET))
     envs = ClusterVectorEnv(16, scenario, observation="menu")
     observation, _ = envs.reset(seed=0)
@@ -123,7 +123,7 @@ def test_rllib_trains_the_same_network_and_goes_on_where_it_was_stopped(tmp_path
     assert json.loads((folder / "ray" / "periods.json").read_text()) >= SHORT["steps"]
     left = {"config.json", "policy.json", "policy.safetensors", "ray", "report.html"}
     assert {path.name for path in folder.iterdir()} == left
-    network = Network.load(folder / "policy.safetensors")
+    network = PolicyNetwork.load(folder / "policy.safetensors")
     assert isinstance(network, EntryNetwork) and network.sizes["outputs"] == 1
     scenario = Scenario.named("PreDC-v0", **parse_overrides(SET))
     assert evaluate([str(folder)], scenario, [4.0], episodes=3).values(str(folder), 4.0, "return").shape == (3,)
@@ -153,9 +153,11 @@ def test_damaged_files_say_so(run, tmp_path):
 @pytest.mark.parametrize("asked, level", [({}, 1.0), ({"level": 0.0}, 0.0), ({"scenario": "Rssi-v0"}, 0.0)])
 def test_advantages_are_levelled_as_asked_for_or_where_nodes_measure_positions(asked, level):
     settings = train.Training(**asked)
-    scenario = train.complete(settings)
-    speaks = train.Settings(action="menu", observation="menu", reward="belief", order=settings.order)
-    envs = train.VecMonitor(train.SB3VecEnv(train.make_envs(settings, scenario, speaks, settings.rows), stagger=True))
+    scenario = train.complete_settings(settings)
+    interface = train.Settings(action="menu", observation="menu", reward="belief", order=settings.order)
+    envs = train.VecMonitor(
+        train.SB3VecEnv(train.make_envs(settings, scenario, interface, settings.rows), stagger=True)
+    )
     buffer = train.make_model(settings, envs, Path("nowhere")).rollout_buffer
     buffer.observations[0, :, :] = envs.reset()
     buffer.rewards[0] = 1.0 + np.arange(buffer.n_envs)
@@ -197,7 +199,7 @@ def test_a_mistyped_run_leaves_no_trap(tmp_path):
 
 def test_saved_policies_are_checked(run, tmp_path):
     scenario = Scenario.named("PreDC-v0", **parse_overrides(SET))
-    network = Network.load(run / "policy.safetensors")
+    network = PolicyNetwork.load(run / "policy.safetensors")
     with pytest.raises(ValueError, match="finite"):
         EntryNetwork(network.arrays | {"belief.bias": np.full(32, np.nan)})
     with pytest.raises(ValueError, match="does not fit"):

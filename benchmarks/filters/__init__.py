@@ -6,11 +6,11 @@ effective sample size, systematic resampling.
 
 from importlib import import_module
 
-from benchmarks.filters.contestant import Absent, Contestant, Looped
+from benchmarks.filters.implementation import Absent, Implementation, Looped
 from benchmarks.filters.problem import Problem
 
 # By name: the module and its class. A module imports its peer, so that it is read only when it takes part.
-CONTESTANTS = {
+IMPLEMENTATIONS = {
     "wsn_env, strict": ("ours", "Strict"),
     "wsn_env, fast": ("ours", "Fast"),
     "C, -O3 -march=native": ("reference", "Reference"),
@@ -31,16 +31,16 @@ SLOW_STARTERS = frozenset(
 )  # compile for seconds for every shape: short runs and grids leave them out
 
 
-def kind_of(name: str) -> type[Contestant]:
-    """The class of a contestant. Raises Absent if its package is not installed."""
-    module, attribute = CONTESTANTS[name]
+def kind_of(name: str) -> type[Implementation]:
+    """The class of an implementation. Raises Absent if its package is not installed."""
+    module, attribute = IMPLEMENTATIONS[name]
     try:
         return getattr(import_module(f"benchmarks.filters.{module}"), attribute)
     except ImportError as error:
         raise Absent(str(error)) from None
 
 
-def enter(name: str, problem: Problem) -> Contestant:
-    """A contestant at the start of a problem of any number of rows. Raises Absent if it cannot take part."""
+def enter(name: str, problem: Problem) -> Implementation:
+    """An implementation at the start of a problem of any number of rows. Raises Absent if it cannot take part."""
     kind = kind_of(name)
     return kind(problem) if kind.batches or problem.rows == 1 else Looped(kind, problem)

@@ -1,4 +1,4 @@
-"""Do the contestants compute the same posterior? Checked before any of them is timed."""
+"""Do the implementations compute the same posterior? Checked before any of them is timed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from benchmarks.filters import Absent, Problem, enter, kind_of
 from benchmarks.filters.exact import estimates, kalman, largest_difference
 
 STRICT = "wsn_env, strict"
-FALSE_ALARM = 1e-4  # probability that a contestant which computes the same is taken for another, over all its figures
+FALSE_ALARM = 1e-4  # probability that an implementation that computes the same is taken for another, over all its
 
 
 def noiseless_difference(name: str, measurement: str, particles: int = 1000, periods: int = 5, rows: int = 2) -> float:
@@ -37,7 +37,7 @@ def noisy_differences(
     """
     problem = Problem.draw(measurement, particles, rows, seed)
     kernel = estimates(enter(STRICT, problem))
-    with seeded(seed):
+    with seed_global_generators(seed):
         own = estimates(enter(name, replace(problem, keys=~problem.keys)))
     found = _differences("kernel", own, kernel)
     found["kernel, N_eff"] = _standard_errors(np.log(own[2] / kernel[2]).mean(axis=0))
@@ -73,7 +73,7 @@ def limit(figures: int, rows: int) -> float:
 
 
 @contextlib.contextmanager
-def seeded(seed: int) -> Iterator[None]:
+def seed_global_generators(seed: int) -> Iterator[None]:
     """The global generators, from which most packages resample, from a seed; afterwards as they were."""
     states = random.getstate(), np.random.get_state()
     random.seed(seed)
@@ -85,10 +85,10 @@ def seeded(seed: int) -> Iterator[None]:
         np.random.set_state(states[1])
 
 
-def check(
+def check_agreement(
     names: Iterable[str], measurement: str, short: bool = False
 ) -> tuple[dict[str, dict[str, float]], dict[str, str]]:
-    """Figures of the contestants that are here, and why others are not. Raises if one computes something else.
+    """Figures of the implementations that are here, and why others are not. Raises if one computes something else.
 
     Args:
         short: be content with fewer rows and particles, which take a tenth of the time and find grosser errors only.

@@ -1,10 +1,10 @@
-"""What the contestants ought to find: the Kalman filter, exact for positions; and how far a contestant is from it."""
+"""What the implementations ought to find: the Kalman filter, exact for positions; and how far one is from it."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.filters.contestant import Contestant
+from benchmarks.filters.implementation import Implementation
 from benchmarks.filters.problem import PERIODS, Problem, constant_velocity
 
 
@@ -32,12 +32,12 @@ def kalman(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
     return np.array(means), np.array(covs)
 
 
-def estimates(contestant: Contestant, periods: int = PERIODS) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Means (periods, B, 4), covariances (periods, B, 4, 4), N_eff (periods, B) of a contestant from its start."""
+def estimates(implementation: Implementation, periods: int = PERIODS) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Means (periods, B, 4), covariances (periods, B, 4, 4), N_eff (periods, B) of an implementation from its start."""
     found = []
     for _ in range(periods):
-        contestant.step()
-        found.append([np.array(part) for part in contestant.estimate()])
+        implementation.step()
+        found.append([np.array(part) for part in implementation.estimate()])
     return tuple(np.array(part) for part in zip(*found))
 
 

@@ -6,11 +6,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from benchmarks.filters.contestant import Contestant
+from benchmarks.filters.implementation import Implementation
 from benchmarks.filters.problem import Problem
 
 
-class Jax(Contestant):
+class Jax(Implementation):
     """float32; with a single row there is no vmap."""
 
     batches = True

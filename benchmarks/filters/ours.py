@@ -7,12 +7,12 @@ import inspect
 
 import numpy as np
 
-from benchmarks.filters.contestant import Absent, Contestant
+from benchmarks.filters.implementation import Absent, Implementation
 from benchmarks.filters.problem import MEMBERS, Problem
 from wsn_env.simulation.world import World
 
 
-class Strict(Contestant):
+class Strict(Implementation):
     """Identical bits on every processor, for any batch and any number of threads."""
 
     batches = True

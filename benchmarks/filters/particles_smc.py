@@ -6,7 +6,7 @@ from particles import distributions
 from particles.collectors import Moments
 from particles.state_space_models import Bootstrap, StateSpaceModel
 
-from benchmarks.filters.contestant import Contestant
+from benchmarks.filters.implementation import Implementation
 from benchmarks.filters.problem import PERIODS, Problem, constant_velocity
 
 
@@ -73,7 +73,7 @@ def moments(weights, x) -> tuple[np.ndarray, np.ndarray]:
     return mean, (deviation * weights[:, None]).T @ deviation
 
 
-class Particles(Contestant):
+class Particles(Implementation):
     """SMC, resampling (at the start of the next step) with its systematic scheme."""
 
     package = "particles"

@@ -3,11 +3,11 @@
 import numpy as np
 import pfilter
 
-from benchmarks.filters.contestant import Contestant
+from benchmarks.filters.implementation import Implementation
 from benchmarks.filters.problem import Problem, constant_velocity
 
 
-class PFilter(Contestant):
+class PFilter(Implementation):
     """Its `update`, with its systematic resampling."""
 
     package = "pfilter"

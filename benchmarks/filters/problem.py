@@ -1,4 +1,4 @@
-"""What every contestant filters: a target that crosses the field, and the reports of the nodes nearest to it."""
+"""What every implementation filters: a target that crosses the field, and the reports of the nodes nearest to it."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.filters.contestant import Absent, Contestant
+from benchmarks.filters.implementation import Absent, Implementation
 from benchmarks.filters.problem import MEMBERS, PERIODS, Problem
 from wsn_env.compiled import draws
 from wsn_env.filters.resampling import REACH
@@ -51,7 +51,7 @@ def _pointer(array: np.ndarray) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
 
 
-class Reference(Contestant):
+class Reference(Implementation):
     """As fast as C becomes without changing results by reordering; products may be fused with sums."""
 
     batches = True

@@ -15,7 +15,7 @@ from stonesoup.types.hypothesis import SingleHypothesis
 from stonesoup.types.state import ParticleState
 from stonesoup.updater.particle import ParticleUpdater
 
-from benchmarks.filters.contestant import Contestant
+from benchmarks.filters.implementation import Implementation
 from benchmarks.filters.problem import PERIODS, Problem, constant_velocity
 
 START = datetime(2025, 1, 1)
@@ -45,7 +45,7 @@ class Strength(NonLinearGaussianMeasurement):
         raise NotImplementedError
 
 
-class Stacked(Contestant):
+class Stacked(Implementation):
     """The m reports as one long measurement, the quickest way."""
 
     package = "stonesoup"

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from benchmarks.filters.contestant import Contestant
+from benchmarks.filters.implementation import Implementation
 from benchmarks.filters.problem import constant_velocity
 
 
@@ -58,7 +58,7 @@ class ParticleFilter:
         self.weights = np.full(count, 1 / count)
 
 
-class Textbook(Contestant):
+class Textbook(Implementation):
     """A filter of the class above on one row."""
 
     kind = ParticleFilter

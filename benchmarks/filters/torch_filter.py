@@ -5,11 +5,11 @@ import shutil
 import numpy as np
 import torch
 
-from benchmarks.filters.contestant import Absent, Contestant
+from benchmarks.filters.implementation import Absent, Implementation
 from benchmarks.filters.problem import Problem
 
 
-class Torch(Contestant):
+class Torch(Implementation):
     """Eager. float32 with sums of weights in double."""
 
     batches = True

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from benchmarks.filters.contestant import Contestant
+from benchmarks.filters.implementation import Implementation
 from benchmarks.filters.problem import Problem
 
 F = np.float32
 
 
-class Tuned(Contestant):
+class Tuned(Implementation):
     """All rows in each call of NumPy."""
 
     batches = True

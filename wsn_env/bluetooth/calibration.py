@@ -31,7 +31,7 @@ LISTS: dict[str, tuple[str, dict[str, Any]]] = {
     "at_1m_db": ("level at 1 m (P0) [dBm]", {}),
     "exponents": ("path loss exponents (n)", dict(above=0)),
 }
-NUMBERS: dict[str, tuple[str, dict[str, Any]]] = {
+SCALARS: dict[str, tuple[str, dict[str, Any]]] = {
     "side_m": ("width of the room, along x", dict(above=0)),
     "depth_m": ("depth of the room, along y", dict(above=0)),
     "beacon_m": ("mean height of the beacon", {}),
@@ -49,7 +49,7 @@ NUMBERS: dict[str, tuple[str, dict[str, Any]]] = {
     "interval_s": ("advertising interval", dict(above=0)),
     "bias_s": ("time constant of the tracker's bias", dict(above=0)),
 }
-QUANTITIES = LISTS | NUMBERS
+QUANTITIES = LISTS | SCALARS
 
 
 class CalibrationError(ValueError):
@@ -136,7 +136,7 @@ def _check_quantities(quantities: dict[str, Any]) -> None:
     for name in QUANTITIES:
         if name not in quantities:
             raise CalibrationError(f"quantities.{name}: is missing ({QUANTITIES[name][0]})")
-    for name, (_, allowed) in NUMBERS.items():
+    for name, (_, allowed) in SCALARS.items():
         check_quantity("quantities", name, quantities[name], **allowed)
     positions = quantities["positions"]
     count = len(positions) if isinstance(positions, list) else 0

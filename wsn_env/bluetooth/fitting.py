@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.optimize import minimize
 
-from wsn_env.bluetooth.calibration import NUMBERS, QUANTITIES, Calibration, CalibrationError
+from wsn_env.bluetooth.calibration import QUANTITIES, SCALARS, Calibration, CalibrationError
 from wsn_env.bluetooth.covariance import LEAST_BIAS, autocovariance, fit_bias, lagged_covariance
 from wsn_env.bluetooth.losses import measure_losses
 from wsn_env.bluetooth.packets import Packets, concatenate_tracks
@@ -95,7 +95,7 @@ def calibrate(tracks: Sequence[Track]) -> Calibration:
         "white_db": sqrt(white),
         "mixture_of_residuals": fit_mixture(residual * sqrt(white / variance), 0.0, white),
         "skewness": float(np.mean((residual - residual.mean()) ** 3) / variance**1.5),
-        **{name: value for name, value in losses.items() if name not in NUMBERS},
+        **{name: value for name, value in losses.items() if name not in SCALARS},
     }
     made_by = {"python": platform.python_version()} | {name: version(name) for name in ("wsn_env", "numpy", "scipy")}
     names = tuple(track.name for track in tracks)

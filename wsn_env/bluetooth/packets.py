@@ -88,7 +88,7 @@ class HeldOut:
     residual_db: np.ndarray
 
 
-def hold_out(tracks: Sequence[Track], whole: Calibration, parts: Iterable[Calibration]) -> HeldOut:
+def held_out_residuals(tracks: Sequence[Track], whole: Calibration, parts: Iterable[Calibration]) -> HeldOut:
     """Residuals of every track against the calibration without it."""
     packets = concatenate_tracks(tracks)
     residual = residuals(packets, whole)

@@ -22,7 +22,6 @@ from wsn_env.evaluation.kept_blocks import remove_kept_blocks
 from wsn_env.evaluation.progress import Progress
 from wsn_env.evaluation.rollout import Engine
 from wsn_env.evaluation.versions import versions
-from wsn_env.models.measurement.beacon import Beacon
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.models.recordings.dataset import read_dataset, track_files, track_name
 from wsn_env.models.recordings.receivers import DatasetError
@@ -63,7 +62,7 @@ class RecordedEvaluation:
         members = [policy for policy in self.first.policies if policy != stem and stem_of(policy) == stem]
         return sorted(members, key=lambda policy: self.mean(policy, lam, "energy_mj"))
 
-    def at_energy(self, stem: str, lam: float, energy_mj: float) -> float | None:
+    def rms_at_energy_m(self, stem: str, lam: float, energy_mj: float) -> float | None:
         """RMS of a family at an energy, on straight lines between its members [m]; None: beyond them."""
         members = self.family(stem, lam)
         energies = [self.mean(policy, lam, "energy_mj") for policy in members]
@@ -102,7 +101,7 @@ def evaluate_recorded(
     Args:
         policies: as for `evaluate`; {track} in a name or path stands for the track's name, for policies that were
             trained without it.
-        scenario: a Beacon scenario; {track} in its residual_map stands for the track's name, too.
+        scenario: one with a beacon's receivers; {track} in its residual_map stands for the track's name, too.
         folder: of the published format: tetam.dev and *.mbd.
         lams: the trade-offs [m/mJ]; None: the scenario's.
         seeds: of the filter, for each track.
@@ -113,7 +112,7 @@ def evaluate_recorded(
     Raises:
         ValueError: another scenario, nothing to read, or too few tracks to leave one out.
     """
-    _beacon_of(scenario)
+    _check_receivers(scenario)
     paths = {track_name(path): path for path in track_files(folder)}
     scenarios = {name: scenario for name in paths}
     if not calibrated:
@@ -128,12 +127,12 @@ def evaluate_recorded(
     for number, (name, path) in enumerate(paths.items()):
         evaluations[name] = evaluate(
             insert_track_name(policies, name),
-            _replay(scenarios[name], name, path),
+            _replay_track(scenarios[name], name, path),
             lams,
             seeds,
             seed,
             keep=None if keep is None else Path(keep) / "tracks" / name,
-            progress=progress and _shifted(progress, number, len(paths), name),
+            progress=progress and _progress_of_track(progress, number, len(paths), name),
             engine=engine,
         )
     return RecordedEvaluation(evaluations)
@@ -148,39 +147,38 @@ def replay_scenario(scenario: Scenario, path: str | Path, calibrated: bool = Fal
     """The replay of one track, calibrated on the others of its folder if there are any.
 
     Args:
-        scenario: a Beacon scenario.
+        scenario: one with a beacon's receivers.
         path: of the track.
         calibrated: the scenario has its own calibration.
 
     Raises:
         ValueError: another scenario, or no such track.
     """
-    _beacon_of(scenario)
+    _check_receivers(scenario)
     path = Path(path)
     if not path.is_file():
         raise DatasetError(f"{path}: is no file; a recorded track is a *.mbd file")
     if not calibrated and len(track_files(path.parent)) > 1:
         others = [track for track in read_dataset(path.parent) if track.name != track_name(path)]
         scenario = scenario.override(**calibrate(others).quantities)
-    return _replay(scenario, track_name(path), path)
+    return _replay_track(scenario, track_name(path), path)
 
 
-def _beacon_of(scenario: Scenario) -> Beacon:
-    """Its measurement, which must hear a beacon."""
-    if not isinstance(scenario.measurement, Beacon):
+def _check_receivers(scenario: Scenario) -> None:
+    """Raise ScenarioError unless errors last, as those of received levels do: what a calibration is made for."""
+    if not scenario.measurement.lasting_errors:
         raise ScenarioError(
             f"scenario = {scenario.name!r}: has no receivers that hear a beacon; recorded tracks are for Ble-v0"
         )
-    return scenario.measurement
 
 
-def _replay(scenario: Scenario, name: str, path: Path) -> Scenario:
-    maps = _beacon_of(scenario).residual_map
-    maps = maps and maps.replace("{track}", name)
-    return scenario.override(motion="replay", recording=str(path), residual_map=maps)
+def _replay_track(scenario: Scenario, name: str, path: Path) -> Scenario:
+    residual_map = getattr(scenario.measurement, "residual_map", None)
+    maps = {} if residual_map is None else {"residual_map": residual_map.replace("{track}", name)}
+    return scenario.override(motion="replay", recording=str(path), **maps)
 
 
-def _shifted(progress: Progress, number: int, of: int, name: str) -> Progress:
+def _progress_of_track(progress: Progress, number: int, of: int, name: str) -> Progress:
     return lambda done, total, what: progress(number * total + done, of * total, f"{name}: {what}")
 
 

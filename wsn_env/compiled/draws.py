@@ -106,7 +106,7 @@ def _uniform_rows(seeds, out):
 
 
 def uniforms(seeds: Any, count: int) -> np.ndarray:
-    """U[0, 1) numbers for policies: (B, count) from the view's luck (B,), alike in every batch."""
+    """U[0, 1) numbers for policies: (B, count) from the view's `random_bits` (B,), alike in every batch."""
     out = np.empty((len(seeds), count))
     _uniform_rows(np.ascontiguousarray(seeds, dtype=np.uint32), out)
     return out

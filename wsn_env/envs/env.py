@@ -85,7 +85,7 @@ class ClusterEnv(gym.Env):
         self._lam, self._period = self._state.lam.item(), 0
         self._squares = 0.0
         self._detections = 0
-        info = self._judge(outcome)[1]
+        info = self._reward_and_info(outcome)[1]
         if self._bound is not None:
             info["bound_m"] = self._bound.begin(self._state).item()
         if self._camera is not None:
@@ -99,9 +99,9 @@ class ClusterEnv(gym.Env):
             raise gym.error.ResetNeeded("call reset() before step()")
         if self._period >= self.scenario.periods:
             raise gym.error.ResetNeeded(f"the episode ended after {self.scenario.periods} periods: call reset()")
-        cluster = self.interface.action.cluster(_batched(action), self._view)
+        cluster = self.interface.action.cluster(_add_batch_axis(action), self._view)
         self._state, outcome = self.world.step(self._state, cluster, donate=True)
-        reward, info = self._judge(outcome)
+        reward, info = self._reward_and_info(outcome)
         self._period += 1
         if self._period > self.scenario.unscored:
             self._squares += info["error_m"] * info["error_m"]
@@ -118,11 +118,11 @@ class ClusterEnv(gym.Env):
             if self._bound is not None:
                 info["episode_bound_m"] = self._bound.episode_m().item()
                 if self._bound.kind == "bound":
-                    info["episode_floor_m"] = self._bound.floor_m(self._state).item()
+                    info["episode_bound_all_awake_m"] = self._bound.bound_all_awake_m(self._state).item()
         return self._observe(), reward, False, truncated, info
 
-    def _judge(self, outcome: Outcome) -> tuple[float | np.ndarray, dict[str, Any]]:
-        return self.interface.judge(dict(zip(_OUTCOMES, outcome.row.item())), self._lam)
+    def _reward_and_info(self, outcome: Outcome) -> tuple[float | np.ndarray, dict[str, Any]]:
+        return self.interface.reward_and_info(dict(zip(_OUTCOMES, outcome.row.item())), self._lam)
 
     @property
     def view(self) -> View:
@@ -155,5 +155,5 @@ class ClusterEnv(gym.Env):
         return arrays[0]
 
 
-def _batched(action: Any) -> Any:
+def _add_batch_axis(action: Any) -> Any:
     return {k: np.asarray(v)[None] for k, v in action.items()} if isinstance(action, dict) else np.asarray(action)[None]

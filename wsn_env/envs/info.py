@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-TOLD = (
+OUTCOME_FIELDS = (
     "error_m",
     "energy_mj",
     "members",
@@ -21,7 +21,7 @@ TOLD = (
 )
 
 
-def measures(outcome: Mapping[str, Any], lam: Any, reward: Any) -> dict[str, Any]:
+def period_info(outcome: Mapping[str, Any], lam: Any, reward: Any) -> dict[str, Any]:
     """The info of a period. It carries truth: for loggers only, never for policies.
 
     Args:
@@ -30,7 +30,7 @@ def measures(outcome: Mapping[str, Any], lam: Any, reward: Any) -> dict[str, Any
         reward: of the period; its two parts are told apart here. None, of a vector reward: they are the parts of the
             mission's reward at this lam.
     """
-    info = {name: outcome[name] for name in TOLD}
+    info = {name: outcome[name] for name in OUTCOME_FIELDS}
     info["reward_energy"] = -lam * outcome["energy_mj"]
     info["reward_error"] = -outcome["error_m"] if reward is None else reward - info["reward_energy"]
     return info

@@ -6,7 +6,7 @@ from typing import Any
 from gymnasium.spaces import Box
 
 from wsn_env.envs.actions import Action, ActionName, make_action
-from wsn_env.envs.info import measures
+from wsn_env.envs.info import period_info
 from wsn_env.envs.observations import Observation, ObservationName, make_observation
 from wsn_env.envs.rewards import RewardName, make_reward, reward_space
 from wsn_env.models.measurement.base import Order
@@ -15,7 +15,7 @@ from wsn_env.scenario import Scenario
 
 @dataclass(frozen=True)
 class Settings:
-    """How an environment speaks, whatever the scenario."""
+    """An environment's actions, observations and rewards, whatever the scenario."""
 
     action: ActionName = "menu"
     observation: ObservationName = "candidates"
@@ -35,7 +35,7 @@ class Interface:
         self.reward_space: Box | None = reward_space(settings.reward)
         self._reward = make_reward(settings.reward)
 
-    def judge(self, outcome: Any, lam: Any) -> tuple[Any, dict[str, Any]]:
+    def reward_and_info(self, outcome: Any, lam: Any) -> tuple[Any, dict[str, Any]]:
         """A period's reward and info, of arrays (B, ...) or of one row's numbers."""
         reward = self._reward(outcome, lam)
-        return reward, measures(outcome, lam, reward if self.reward_space is None else None)
+        return reward, period_info(outcome, lam, reward if self.reward_space is None else None)

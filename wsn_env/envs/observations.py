@@ -206,7 +206,7 @@ class ViewObservation:
             {
                 "period": spaces.Discrete(scenario.periods + 1),
                 "lam": box(0.0, max(scenario.lam_range[1], 1.0), 1),
-                "luck": spaces.Box(0, 2**32 - 1, (1,), np.int64),
+                "random_bits": spaces.Box(0, 2**32 - 1, (1,), np.int64),
                 "log_miss": box(-far, 0.0, 1),
                 "mean": box(-far, far, 4),
                 "cov": box(-far, far, 4, 4),

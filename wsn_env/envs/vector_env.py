@@ -109,7 +109,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             self._state = self.world.allocate(self.num_envs)
         info = self._restart(rows)
         self._show()
-        return self._observe(rows), _masked(info, rows)
+        return self._observe(rows), _mask_info(info, rows)
 
     def _rows_to_reset(self, options: dict[str, Any] | None) -> np.ndarray:
         mask = (options or {}).get("reset_mask")
@@ -132,7 +132,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self._squares[rows] = 0.0
         self._detections[rows] = 0
         self._ended = self._ended & ~rows
-        info = self.interface.judge(outcome.row, self._state.lam)[1]
+        info = self.interface.reward_and_info(outcome.row, self._state.lam)[1]
         if self._bound is not None:
             info["bound_m"] = self._bound.begin(self._state, rows)
         if self._camera is not None:
@@ -149,9 +149,9 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             raise gym.error.ResetNeeded(
                 f"rows {np.flatnonzero(anew).tolist()} have ended: reset them with options={{'reset_mask': ...}}"
             )
-        cluster = self.interface.action.cluster(_stacked(actions), self._view)
+        cluster = self.interface.action.cluster(_stack_actions(actions), self._view)
         self._state, outcome = self.world.step(self._state, cluster, donate=True)
-        reward, info = self.interface.judge(outcome.row, self._state.lam)
+        reward, info = self.interface.reward_and_info(outcome.row, self._state.lam)
         self._squares += np.where(self._state.period > self.scenario.unscored, outcome.error_m * outcome.error_m, 0.0)
         self._detections += outcome.detections
         if self._bound is not None:
@@ -160,17 +160,17 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             self._camera.add(self._state, outcome)
         if begins:  # next-step mode: these rows only begin
             reward[anew] = 0.0
-            _overwrite(info, self._restart(anew), anew)
+            _overwrite_rows(info, self._restart(anew), anew)
         truncated = self._state.period >= self.scenario.periods
         terminated = np.zeros(self.num_envs, dtype=bool)
         ends = truncated.any()
         if ends and self.autoreset_mode == AutoresetMode.SAME_STEP:
-            return self._same_step(reward, terminated, truncated, info)
+            return self._restart_within_step(reward, terminated, truncated, info)
         self._ended = truncated.copy()
         self._show()
-        infos = _masked(info)
+        infos = _mask_info(info)
         if ends:
-            infos |= _masked(self._episode_info(truncated), truncated)
+            infos |= _mask_info(self._episode_info(truncated), truncated)
         return self._observe(), reward, terminated, truncated, infos
 
     def _episode_info(self, rows: np.ndarray) -> dict[str, np.ndarray]:
@@ -180,10 +180,10 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         if self._bound is not None:
             info["episode_bound_m"] = self._bound.episode_m()
             if self._bound.kind == "bound":
-                info["episode_floor_m"] = self._bound.floor_m(self._state, rows)
+                info["episode_bound_all_awake_m"] = self._bound.bound_all_awake_m(self._state, rows)
         return info
 
-    def _same_step(
+    def _restart_within_step(
         self, reward: np.ndarray, terminated: np.ndarray, truncated: np.ndarray, info: dict[str, Any]
     ) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Begin the ended rows within the step; their last observation and info go to final_obs and final_info."""
@@ -192,11 +192,11 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         for i in np.flatnonzero(truncated):
             final[i] = {name: value[i] for name, value in last.items()} if isinstance(last, dict) else last[i]
         infos: dict[str, Any] = {"final_obs": final, "_final_obs": truncated.copy()}
-        infos["final_info"] = _masked(info | self._episode_info(truncated), truncated)
+        infos["final_info"] = _mask_info(info | self._episode_info(truncated), truncated)
         infos["_final_info"] = truncated.copy()
-        _overwrite(info, self._restart(truncated), truncated)
+        _overwrite_rows(info, self._restart(truncated), truncated)
         self._show()
-        infos |= _masked(info)
+        infos |= _mask_info(info)
         return self._observe(truncated), reward, terminated, truncated, infos
 
     @property
@@ -242,14 +242,14 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         return observation
 
 
-def _stacked(actions: Any) -> Any:
+def _stack_actions(actions: Any) -> Any:
     """A dict of arrays from a list of dicts, as policies' predict() gives them; anything else as it is."""
     if isinstance(actions, (list, tuple, np.ndarray)) and len(actions) and isinstance(actions[0], dict):
         return {name: np.stack([one[name] for one in actions]) for name in actions[0]}
     return actions
 
 
-def _masked(info: dict[str, np.ndarray], rows: np.ndarray | None = None) -> dict[str, np.ndarray]:
+def _mask_info(info: dict[str, np.ndarray], rows: np.ndarray | None = None) -> dict[str, np.ndarray]:
     """Gymnasium's form of a vector info: zeros where a row has none, and a mask under "_name".
 
     Args:
@@ -266,6 +266,6 @@ def _masked(info: dict[str, np.ndarray], rows: np.ndarray | None = None) -> dict
     return out
 
 
-def _overwrite(info: dict[str, np.ndarray], other: dict[str, np.ndarray], rows: np.ndarray) -> None:
+def _overwrite_rows(info: dict[str, np.ndarray], other: dict[str, np.ndarray], rows: np.ndarray) -> None:
     for name, value in other.items():
         info[name][rows] = value[rows]

@@ -23,7 +23,7 @@ from wsn_env.evaluation.intervals import Summary
 from wsn_env.evaluation.kept_blocks import KeptBlocks
 from wsn_env.evaluation.policies import Policy, named_policies
 from wsn_env.evaluation.progress import Progress
-from wsn_env.evaluation.rollout import BLOCK, Block, Engine, at_lam, evaluation_seeds, in_this_process
+from wsn_env.evaluation.rollout import BLOCK, Block, Engine, change_lam, evaluation_seeds, in_this_process
 from wsn_env.evaluation.versions import versions
 from wsn_env.models.quantity import suggest
 from wsn_env.scenario import Scenario
@@ -31,7 +31,7 @@ from wsn_env.simulation.bound import bound_kind
 
 COLUMNS = (
     "policy scenario lam episode seed periods return error_m rms_m energy_mj members handovers searches lost"
-    " bound_m floor_m anees"
+    " bound_m bound_all_awake_m anees"
 ).split()
 Row = dict[str, str | float]  # of the columns in COLUMNS
 MEANS = ("return", "rms_m", "error_m", "energy_mj", "members", "handovers", "searches", "lost")
@@ -81,7 +81,7 @@ class Evaluation:
         """Root mean square of the bound with all nodes awake, the same for every policy; None: there is no bound."""
         if bound_kind(self.scenario) == "none":
             return None
-        return float(np.sqrt(np.mean(self.values(self.policies[0], self.lams[0], "floor_m") ** 2)))
+        return float(np.sqrt(np.mean(self.values(self.policies[0], self.lams[0], "bound_all_awake_m") ** 2)))
 
     def difference(self, policy: str, reference: str, lam: float, column: str = "return") -> Summary:
         """Paired difference policy - reference over the common episodes."""
@@ -98,8 +98,10 @@ class Evaluation:
 
     def family_name(self, stem: str) -> str:
         """ "nearest0..8", by the least and the largest number that was compared."""
-        numbers = [int(policy.removeprefix(stem)) for policy in self.policies if policy != stem == stem_of(policy)]
-        return f"{stem}{min(numbers)}..{max(numbers)}"
+        member_numbers = [
+            int(policy.removeprefix(stem)) for policy in self.policies if policy != stem == stem_of(policy)
+        ]
+        return f"{stem}{min(member_numbers)}..{max(member_numbers)}"
 
     def best_of(self, stem: str, lam: float) -> str:
         """The member of a numbered family with the best mean return: the best in hindsight.
@@ -126,18 +128,18 @@ class Evaluation:
             {"policy": policy, "lam": lam}
             | {column: vars(value) for column, value in self.summary(policy, lam).items()}
             | {f"return_minus_{self.policies[0]}": vars(self.difference(policy, self.policies[0], lam))}
-            | self._against_the_bound(policy, lam)
+            | self._compare_to_bound(policy, lam)
             for lam in self.lams
             for policy in self.policies
         ]
         with replacing(out / "evaluation.json") as path:
             path.write_text(json.dumps(self.settings() | {"versions": versions(), "means": means}, indent=1))
 
-    def _against_the_bound(self, policy: str, lam: float) -> dict[str, object]:
+    def _compare_to_bound(self, policy: str, lam: float) -> dict[str, object]:
         ratio = self.rms_over_bound(policy, lam)
         if ratio is None:
             return {}
-        return {f"rms_over_{bound_kind(self.scenario)}": vars(ratio), "floor_m": self.bound_all_awake_m()}
+        return {f"rms_over_{bound_kind(self.scenario)}": vars(ratio), "bound_all_awake_m": self.bound_all_awake_m()}
 
     def settings(self) -> dict[str, Any]:
         """What was asked for."""
@@ -205,7 +207,7 @@ def evaluate(
         for name, policy in named.items():
             used_lam = lam if getattr(policy, "sees_lam", True) else None
             measured = [one for number in range(-(-episodes // BLOCK)) for one in kept.get(name, used_lam, number)]
-            for episode, values in enumerate(at_lam(measured, lam)):
+            for episode, values in enumerate(change_lam(measured, lam)):
                 row: dict[str, Any] = {
                     "policy": name,
                     "scenario": scenario.name,

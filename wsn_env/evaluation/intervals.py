@@ -24,10 +24,10 @@ class Summary:
     @classmethod
     def of(cls, values: ArrayLike) -> Summary:
         """Percentile bootstrap over episodes, with a fixed seed; no interval for a single episode."""
-        numbers = np.asarray(values, dtype=float)
-        if len(numbers) < 2 or np.ptp(numbers) == 0:
-            return cls(float(numbers.mean()), float(numbers.min()), float(numbers.max()))
-        return cls.around(numbers.mean(), resampled_means(numbers))
+        episode_values = np.asarray(values, dtype=float)
+        if len(episode_values) < 2 or np.ptp(episode_values) == 0:
+            return cls(float(episode_values.mean()), float(episode_values.min()), float(episode_values.max()))
+        return cls.around(episode_values.mean(), resampled_means(episode_values))
 
     @classmethod
     def of_root_ratio(cls, values: np.ndarray, references: np.ndarray) -> Summary:
@@ -54,21 +54,21 @@ def resampled_means(values: np.ndarray) -> np.ndarray:
     Returns: (RESAMPLES, ...).
     """
     flat = np.asarray(values, float).reshape(len(values), -1)
-    means = np.concatenate([shares @ flat for shares in _shares(len(values))])
+    means = np.concatenate([shares @ flat for shares in _resampling_weights(len(values))])
     return means.reshape(RESAMPLES, *np.shape(values)[1:])
 
 
-def _shares(episodes: int) -> Iterable[np.ndarray]:
+def _resampling_weights(episodes: int) -> Iterable[np.ndarray]:
     """How often each episode is in each sample, over their number, some samples at a time; kept if not too many."""
-    return _kept_shares(episodes) if episodes <= KEPT_EPISODES else _draw_shares(episodes)
+    return _cached_resampling_weights(episodes) if episodes <= KEPT_EPISODES else _draw_resampling_weights(episodes)
 
 
 @lru_cache(maxsize=4)
-def _kept_shares(episodes: int) -> list[np.ndarray]:
-    return list(_draw_shares(episodes))
+def _cached_resampling_weights(episodes: int) -> list[np.ndarray]:
+    return list(_draw_resampling_weights(episodes))
 
 
-def _draw_shares(episodes: int) -> Iterator[np.ndarray]:
+def _draw_resampling_weights(episodes: int) -> Iterator[np.ndarray]:
     rng, at_once = np.random.default_rng(0), 100
     for _ in range(RESAMPLES // at_once):
         drawn = rng.integers(episodes, size=(at_once, episodes)) + episodes * np.arange(at_once)[:, None]

@@ -65,5 +65,5 @@ def _digest(settings: dict[str, Any], policies: Sequence[Policy]) -> str:
     sources = [getattr(sys.modules.get(type(policy).__module__), "__file__", None) for policy in policies]
     files = [*settings["scenario"]["motion"].get("tracks", ()), *filter(None, sources)]
     contents = [hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in files]
-    known = [settings, versions(), sources_digest(), list(map(repr, policies)), contents]
-    return hashlib.sha256(json.dumps(known, sort_keys=True).encode()).hexdigest()
+    inputs = [settings, versions(), sources_digest(), list(map(repr, policies)), contents]
+    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()

@@ -41,6 +41,6 @@ class NativeEnvs(Protocol):
         ...
 
 
-def native(envs: VectorEnv) -> NativeEnvs:
+def unwrap_native(envs: VectorEnv) -> NativeEnvs:
     """What wrappers stand around."""
     return cast(NativeEnvs, envs.unwrapped)

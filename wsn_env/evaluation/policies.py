@@ -50,17 +50,17 @@ def make_policy(name: str, scenario: Scenario, **parameters: Any) -> Policy:
     plain, colon, text = (rest if own else name).partition(":")
     if own:
         try:
-            made_by = class_in(Path(f"{file}.py"), plain)
+            maker = class_in(Path(f"{file}.py"), plain)
         except ValueError as problem:
             raise ValueError(f"policy {problem}") from problem.__cause__
-        return _made(name, made_by, scenario, parameters | _given(colon, text))
-    point, number = _entry_point(plain)
+        return _create_policy(name, maker, scenario, parameters | _parse_parameters(colon, text))
+    point, number = _find_entry_point(plain)
     if point is not None:
         try:
-            made_by = point.load()
+            maker = point.load()
         except (ImportError, AttributeError) as problem:
             raise ValueError(f"policy {name!r}: its entry point {point.value!r} fails: {problem}") from None
-        return _made(name, made_by, scenario, parameters | number | _given(colon, text))
+        return _create_policy(name, maker, scenario, parameters | number | _parse_parameters(colon, text))
     path = Path(name)
     path = path / "policy.json" if path.is_dir() else path
     if path.suffix == ".py":
@@ -83,14 +83,14 @@ def named_policies(texts: Sequence[str], scenario: Scenario) -> dict[str, Policy
             raise ValueError(
                 f"policies: {type(text).__name__} is no name: give policies of your own as {{name: policy}}"
             )
-        label, policy = _labelled(text, scenario)
+        label, policy = _make_labelled_policy(text, scenario)
         if label in named:
             raise ValueError(f"policies: {label!r} is there twice: labels must differ")
         named[label] = policy
     return named
 
 
-def _labelled(text: str, scenario: Scenario) -> tuple[str, Policy]:
+def _make_labelled_policy(text: str, scenario: Scenario) -> tuple[str, Policy]:
     """("ppo", policy) from "ppo=runs/mine/policy.json"; a name or a path alone is its own label."""
     label, equals, source = text.partition("=")
     labelled = equals and ":" not in label  # else parameters: quadrants:n=2
@@ -99,7 +99,7 @@ def _labelled(text: str, scenario: Scenario) -> tuple[str, Policy]:
     return (label, make_policy(source, scenario)) if labelled else (text, make_policy(text, scenario))
 
 
-def _entry_point(name: str) -> tuple[EntryPoint | None, dict[str, int]]:
+def _find_entry_point(name: str) -> tuple[EntryPoint | None, dict[str, int]]:
     """The entry point of a name, and the n of one that ends in a number: "nearest3" is `nearest` with n = 3."""
     points = {point.name: point for point in entry_points(group=GROUP)}
     if name in points:
@@ -108,13 +108,13 @@ def _entry_point(name: str) -> tuple[EntryPoint | None, dict[str, int]]:
     return points.get(stem), {"n": int(name[len(stem) :])} if stem in points else {}
 
 
-def _given(colon: str, text: str) -> dict:
+def _parse_parameters(colon: str, text: str) -> dict:
     return parse_overrides(text.split(",")) if colon else {}
 
 
-def _made(name: str, made_by, scenario: Scenario, parameters: dict) -> Policy:
+def _create_policy(name: str, maker, scenario: Scenario, parameters: dict) -> Policy:
     try:
-        policy = made_by(scenario=scenario, **parameters)
+        policy = maker(scenario=scenario, **parameters)
     except TypeError as problem:
         raise ValueError(f"policy {name!r}: cannot be made with a scenario and its parameters: {problem}") from problem
     if not callable(getattr(policy, "act", None)):

@@ -41,7 +41,7 @@ def on_ray(address: str | None = None) -> Engine:
         if ours:
             connect(address)
         try:
-            yield from _spread(ray, blocks)
+            yield from _play_blocks(ray, blocks)
         finally:
             if ours:
                 ray.shutdown()
@@ -70,11 +70,11 @@ def connect(address: str | None) -> None:
         raise ValueError(f"engine 'ray': no cluster at {address!r} ({problem}): {allowed}") from None
 
 
-def _spread(ray: ModuleType, blocks: Sequence[Block]) -> Iterator[tuple[Block, list[dict[str, float]]]]:
+def _play_blocks(ray: ModuleType, blocks: Sequence[Block]) -> Iterator[tuple[Block, list[dict[str, float]]]]:
     for module in {type(block.policy).__module__ for block in blocks}:
         if module.startswith(OF_FILES):  # which workers cannot import
             ray.cloudpickle.register_pickle_by_value(sys.modules[module])
-    task = ray.remote(num_cpus=1, max_retries=-1, scheduling_strategy="SPREAD")(_measured)
+    task = ray.remote(num_cpus=1, max_retries=-1, scheduling_strategy="SPREAD")(_measure_block)
     waiting = list(reversed(blocks))
     running: dict[ObjectRef[list[dict[str, float]]], Block] = {}
     while waiting or running:
@@ -90,5 +90,5 @@ def _spread(ray: ModuleType, blocks: Sequence[Block]) -> Iterator[tuple[Block, l
             yield running.pop(done), measured
 
 
-def _measured(block: Block) -> list[dict[str, float]]:
+def _measure_block(block: Block) -> list[dict[str, float]]:
     return next(in_this_process(threads=1)([block]))[1]

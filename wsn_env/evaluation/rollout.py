@@ -40,12 +40,12 @@ def episodes(
     if begin is not None:
         begin(state, outcome)
     for _ in range(world.scenario.periods):
-        cluster = _checked(policy.act(View.of(state)), policy, world.scenario.field.nodes)
+        cluster = _check_cluster(policy.act(View.of(state)), policy, world.scenario.field.nodes)
         state, outcome = world.step(state, cluster, donate=True)
         yield state, outcome
 
 
-def _checked(cluster: Cluster, policy: Policy, nodes: int) -> Cluster:
+def _check_cluster(cluster: Cluster, policy: Policy, nodes: int) -> Cluster:
     """What a policy chose; the world would drop and count nodes that do not exist, here they are a mistake."""
     if not isinstance(cluster, Cluster):
         chose = type(cluster).__name__
@@ -71,7 +71,7 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
     scenario = world.scenario
     names = "error", "square", "energy", "members", "handovers", "searches", "lost"
     sums: dict[str, Any] = dict.fromkeys(names, 0.0)
-    judged, ratios = np.zeros(len(seeds)), np.zeros(len(seeds))
+    counted_periods, ratios = np.zeros(len(seeds)), np.zeros(len(seeds))
     bound = None if bound_kind(scenario) == "none" else Bound(scenario, len(seeds), world.threads)
     begin = None if bound is None else lambda state, _: bound.begin(state)
     for state, outcome in episodes(policy, world, seeds, begin):
@@ -79,7 +79,7 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
         sums["error"] += outcome.error_m
         if state.period[0] > scenario.unscored:
             sums["square"] += square
-            judged += believed > 0
+            counted_periods += believed > 0
             ratios += np.divide(square, believed, out=np.zeros(len(seeds)), where=believed > 0)
         sums["energy"] += outcome.energy_mj
         sums["members"] += outcome.members
@@ -103,13 +103,13 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
         "searches": sums["searches"].astype(int),
         "lost": sums["lost"].astype(int),
         "bound_m": np.full(len(seeds), "") if bound is None else bound.episode_m(),
-        "floor_m": np.full(len(seeds), "") if bound is None else bound.floor_m(state),
-        "anees": ratios / np.maximum(judged, 1),
+        "bound_all_awake_m": np.full(len(seeds), "") if bound is None else bound.bound_all_awake_m(state),
+        "anees": ratios / np.maximum(counted_periods, 1),
     }
     return [{name: values[i].item() for name, values in columns.items()} for i in range(len(seeds))]
 
 
-def at_lam(measured: Sequence[dict[str, Any]], lam: float) -> list[dict[str, Any]]:
+def change_lam(measured: Sequence[dict[str, Any]], lam: float) -> list[dict[str, Any]]:
     """The same episodes with the return at another lam: what `rollout` gives of a policy that does not look at it."""
     return [
         values | {"lam": lam, "return": -(values["sum_error_m"] + lam * values["sum_energy_mj"])} for values in measured

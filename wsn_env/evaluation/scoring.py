@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import VectorEnv
 
-from wsn_env.evaluation.native_envs import native
+from wsn_env.evaluation.native_envs import unwrap_native
 from wsn_env.evaluation.rollout import evaluation_seeds
 
 
@@ -28,7 +28,7 @@ def score(act: Callable[[Any], Any], envs: VectorEnv, seed: int = 0) -> np.ndarr
     """
     seeds: Any = evaluation_seeds(seed, envs.num_envs)  # the native environment takes a seed for each row
     observations, _ = envs.reset(seed=seeds)
-    lam, periods = native(envs).lam.copy(), native(envs).scenario.periods
+    lam, periods = unwrap_native(envs).lam.copy(), unwrap_native(envs).scenario.periods
     errors, energies = np.zeros((2, envs.num_envs))
     for _ in range(periods):
         observations, _, _, _, info = envs.step(act(observations))

@@ -71,8 +71,8 @@ def compile_job(job: Job) -> int:
 def _step_environments(job: Job) -> None:
     from wsn_env.envs.env import ClusterEnv
 
-    spoken: tuple[tuple[Order, ObservationName], ...] = (("nearest", "candidates"), ("information", "menu"))
-    for order, observation in spoken:
+    interfaces: tuple[tuple[Order, ObservationName], ...] = (("nearest", "candidates"), ("information", "menu"))
+    for order, observation in interfaces:
         for fast in (False, True) if job.fast else (False,):
             pictures: dict[str, Any] = {"render_mode": "rgb_array", "frame_px": 64}
             env = ClusterEnv(job.scenario, order=order, observation=observation, fast=fast, **pictures, **SMALL)
@@ -88,8 +88,8 @@ def _roll_out(job: Job) -> None:
     from wsn_env.simulation.world import World
 
     scenario = _scenario_of(job)
-    looking = scenario if scenario.measurement.lasting_errors else scenario.override(start="search")
-    for state, _ in episodes(make_policy("nearest2", looking), World(looking), [0]):
+    searching = scenario if scenario.measurement.lasting_errors else scenario.override(start="search")
+    for state, _ in episodes(make_policy("nearest2", searching), World(searching), [0]):
         View.from_arrays(View.of(state).as_arrays())
     rollout(make_policy("nearest2", scenario), World(scenario), [0])  # with its bound
 

@@ -12,7 +12,7 @@ from torch import nn
 
 from wsn_env.envs.features import BELIEF_FEATURES, CANDIDATE_FEATURES
 from wsn_env.envs.prospects import ENTRY_FEATURES
-from wsn_env.learning.network import EntryNetwork, FlatNetwork, Network
+from wsn_env.learning.network import EntryNetwork, FlatNetwork, PolicyNetwork
 
 
 class EntryActorCritic(nn.Module):
@@ -71,7 +71,7 @@ class EntryActorCritic(nn.Module):
         """(B, 1)."""
         return self.critic(observation)
 
-    def network(self) -> EntryNetwork:
+    def actor_network(self) -> EntryNetwork:
         """The actor as NumPy arrays."""
         parts = {"belief": self.belief, "entry": self.entry, "hidden": self.hidden, "score": self.score}
         arrays = {}
@@ -122,11 +122,11 @@ class EntryPolicy(ActorCriticPolicy):
         return super()._get_constructor_parameters() | {"entries": self.entries}
 
 
-def network_of(model: PPO) -> Network:
+def actor_network(model: PPO) -> PolicyNetwork:
     """The actor of a stable-baselines3 PPO model: an EntryPolicy's, or one with two tanh layers."""
     policy = model.policy
     if isinstance(policy, EntryPolicy):
-        return policy.mlp_extractor.network()
+        return policy.mlp_extractor.actor_network()
     layers = [*policy.mlp_extractor.policy_net, policy.action_net]
     linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
     arrays = {}

@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from wsn_env.evaluation.native_envs import native
+from wsn_env.evaluation.native_envs import unwrap_native
 
 
 class ConcatVectorEnv(gym.vector.VectorEnv):
@@ -28,14 +28,14 @@ class ConcatVectorEnv(gym.vector.VectorEnv):
                     raise ValueError(
                         f"ConcatVectorEnv: {name} {getattr(part, name)} differs from {getattr(first, name)}"
                     )
-            if native(part).autoreset_mode != native(first).autoreset_mode:
+            if unwrap_native(part).autoreset_mode != unwrap_native(first).autoreset_mode:
                 raise ValueError("ConcatVectorEnv: the parts' autoreset modes differ")
         self.parts: list[gym.vector.VectorEnv] = list(parts)
         ends = np.cumsum([0] + [part.num_envs for part in parts])
         self._rows = [slice(start, stop) for start, stop in zip(ends, ends[1:])]
         self.num_envs: int = int(ends[-1])
         self.metadata: dict[str, Any] = first.metadata
-        self.autoreset_mode: AutoresetMode = native(first).autoreset_mode
+        self.autoreset_mode: AutoresetMode = unwrap_native(first).autoreset_mode
         self.single_observation_space: gym.Space[Any] = first.single_observation_space
         self.single_action_space: gym.Space[Any] = first.single_action_space
         self.observation_space: gym.Space[Any] = batch_space(self.single_observation_space, self.num_envs)
@@ -57,28 +57,28 @@ class ConcatVectorEnv(gym.vector.VectorEnv):
                 of_rows: Any = None if seeds is None else list(seeds[rows])
                 self._observations[i], info = part.reset(seed=of_rows, **own)
             infos.append(info)
-        return self._joined(self._observations), self._joined_infos(infos)
+        return self._join_observations(self._observations), self._join_infos(infos)
 
     def step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """One period of every part."""
         results = [part.step(actions[rows]) for part, rows in zip(self.parts, self._rows)]
         self._observations = [one[0] for one in results]
         rewards, terminated, truncated = (np.concatenate([one[i] for one in results]) for i in (1, 2, 3))
-        infos = self._joined_infos([one[4] for one in results])
-        return self._joined(self._observations), rewards, terminated, truncated, infos
+        infos = self._join_infos([one[4] for one in results])
+        return self._join_observations(self._observations), rewards, terminated, truncated, infos
 
-    def _joined(self, observations: list[Any]) -> Any:
+    def _join_observations(self, observations: list[Any]) -> Any:
         if isinstance(observations[0], dict):
             return {name: np.concatenate([one[name] for one in observations]) for name in observations[0]}
         return np.concatenate(observations)
 
-    def _joined_infos(self, infos: list[dict[str, Any]]) -> dict[str, Any]:
+    def _join_infos(self, infos: list[dict[str, Any]]) -> dict[str, Any]:
         """Gymnasium's form: where a part has no such entry its rows are zeros, and their mask is False."""
         joined: dict[str, Any] = {}
         for name in dict.fromkeys(name for info in infos for name in info):
             some = next(info[name] for info in infos if name in info)
             if isinstance(some, dict):  # final_info
-                joined[name] = self._joined_infos([info.get(name, {}) for info in infos])
+                joined[name] = self._join_infos([info.get(name, {}) for info in infos])
                 continue
             joined[name] = np.zeros((self.num_envs, *some.shape[1:]), some.dtype)
             for info, rows in zip(infos, self._rows):
@@ -89,11 +89,11 @@ class ConcatVectorEnv(gym.vector.VectorEnv):
     @property
     def lam(self) -> np.ndarray:
         """(B,) the present episodes' trade-offs [m/mJ]."""
-        return np.concatenate([native(part).lam for part in self.parts])
+        return np.concatenate([unwrap_native(part).lam for part in self.parts])
 
     def action_masks(self) -> np.ndarray:
         """(B, n) bool: which entries of each row's action make sense now."""
-        return np.concatenate([native(part).action_masks() for part in self.parts])
+        return np.concatenate([unwrap_native(part).action_masks() for part in self.parts])
 
     def render(self) -> tuple[Any, ...]:
         """Frames of all rows."""

@@ -13,7 +13,7 @@ from ray.rllib.env.single_agent_env_runner import SingleAgentEnvRunner
 from ray.rllib.env.single_agent_episode import SingleAgentEpisode
 from ray.rllib.utils.metrics import WEIGHTS_SEQ_NO
 
-from wsn_env.evaluation.native_envs import native
+from wsn_env.evaluation.native_envs import unwrap_native
 
 
 class NativeRunner(SingleAgentEnvRunner):
@@ -29,7 +29,7 @@ class NativeRunner(SingleAgentEnvRunner):
         super().make_env()
         wrapped: Any = self.env
         self._envs: VectorEnv = wrapped.env  # below DictInfoToList
-        if native(self._envs).autoreset_mode != AutoresetMode.DISABLED:
+        if unwrap_native(self._envs).autoreset_mode != AutoresetMode.DISABLED:
             raise ValueError("NativeRunner: needs an environment with autoreset_mode Disabled")
 
     def _sample(
@@ -54,7 +54,7 @@ class NativeRunner(SingleAgentEnvRunner):
         chunks: list[tuple[int, int, int, np.ndarray, bool, bool]] = []
         since = np.zeros(self.num_envs, int)
         for t in range(periods):
-            for name, values in self._decide(explore).items():
+            for name, values in self._choose_actions(explore).items():
                 columns.setdefault(name, []).append(values)
             columns.setdefault(Columns.OBS, []).append(self._now)
             self._now, rewards, terminated, truncated, _ = self._envs.step(columns[Columns.ACTIONS][-1])
@@ -68,12 +68,12 @@ class NativeRunner(SingleAgentEnvRunner):
         for row in np.flatnonzero(since < periods).tolist():
             chunks.append((row, int(since[row]), periods, self._now[row], False, False))
         stacked = {name: np.stack(values) for name, values in columns.items()}
-        episodes = [self._chunk(stacked, *chunk) for chunk in chunks]
+        episodes = [self._make_chunk(stacked, *chunk) for chunk in chunks]
         self._log_env_steps(metric=self._metrics_num_env_steps_sampled, num_steps=periods * self.num_envs)
         self._increase_sampled_metrics(periods * self.num_envs, sum(one.is_done for one in episodes))
         return episodes
 
-    def _decide(self, explore: bool) -> dict[str, np.ndarray]:
+    def _choose_actions(self, explore: bool) -> dict[str, np.ndarray]:
         """Actions of all rows and what the learner wants to know of them."""
         module: Any = self.module
         forward = module.forward_exploration if explore else module.forward_inference
@@ -86,7 +86,7 @@ class NativeRunner(SingleAgentEnvRunner):
         decided = {Columns.ACTIONS: actions, Columns.ACTION_DIST_INPUTS: inputs, Columns.ACTION_LOGP: logp}
         return {name: values.numpy() for name, values in decided.items()}
 
-    def _chunk(
+    def _make_chunk(
         self,
         columns: dict[str, np.ndarray],
         row: int,

@@ -1,4 +1,4 @@
-"""Small networks from safetensors, run row by row in a fixed order: no torch, the same bits in any batch."""
+"""Policy networks from safetensors, run row by row in a fixed order: no torch, the same bits in any batch."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _run_entries(observations: np.ndarray, weights: Any, out: np.ndarray) -> Non
             _add_product(h1, score_w, out[row, k])
 
 
-class Network:
+class PolicyNetwork:
     """Base: float32 arrays by name whose shapes fit each other, as a subclass's SHAPES says.
 
     Args:
@@ -109,7 +109,7 @@ class Network:
             raise ValueError(f"{path} is not a saved network, or it is cut short: {problem}") from None
 
 
-class FlatNetwork(Network):
+class FlatNetwork(PolicyNetwork):
     """Two hidden layers of tanh and a linear output: the actor of stable-baselines3's MlpPolicy."""
 
     SHAPES = {
@@ -132,7 +132,7 @@ class FlatNetwork(Network):
         return (inputs, logits) == (self.sizes["observation"], self.sizes["logits"])
 
 
-class EntryNetwork(Network):
+class EntryNetwork(PolicyNetwork):
     """Scores each entry of a choice by what is known of it and of the belief, with the same weights for all:
 
         relu(relu(belief W_b + b + entry W_e) W_h + b_h) W_s + b_s

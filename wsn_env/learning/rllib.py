@@ -191,7 +191,7 @@ class RayTraining:
         new.rename(self._folder)
         shutil.rmtree(old, ignore_errors=True)
 
-    def network(self) -> EntryNetwork:
+    def actor_network(self) -> EntryNetwork:
         """The actor as NumPy arrays."""
         module: Any = self._algorithm.get_module()
-        return module.net.network()
+        return module.net.actor_network()

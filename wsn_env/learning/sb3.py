@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
-from wsn_env.evaluation.native_envs import native
+from wsn_env.evaluation.native_envs import unwrap_native
 
 
 class SB3VecEnv(VecEnv):
@@ -29,7 +29,7 @@ class SB3VecEnv(VecEnv):
     """
 
     def __init__(self, envs: gym.vector.VectorEnv, stagger: bool = False) -> None:
-        self._native = native(envs)
+        self._native = unwrap_native(envs)
         self._mode = self._native.autoreset_mode
         if self._mode == AutoresetMode.NEXT_STEP:
             raise ValueError("autoreset_mode NextStep makes rows that are no transitions: use SameStep or Disabled")
@@ -81,7 +81,7 @@ class SB3VecEnv(VecEnv):
             last = info["final_info"] if same_step else info
             for i in np.flatnonzero(done).tolist():
                 infos[i] = _row_info(last, i)
-                infos[i]["terminal_observation"] = info["final_obs"][i] if same_step else _row(observation, i)
+                infos[i]["terminal_observation"] = info["final_obs"][i] if same_step else _copy_row(observation, i)
                 infos[i]["TimeLimit.truncated"] = bool(truncated[i] and not terminated[i])
             if not same_step:
                 observation, _ = self.envs.reset(options={"reset_mask": done})
@@ -121,7 +121,7 @@ class SB3VecEnv(VecEnv):
         return frames
 
 
-def _row(arrays: VecEnvObs, i: int) -> Any:
+def _copy_row(arrays: VecEnvObs, i: int) -> Any:
     return {name: value[i].copy() for name, value in arrays.items()} if isinstance(arrays, dict) else arrays[i].copy()
 
 

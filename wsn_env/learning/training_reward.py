@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from wsn_env.evaluation.native_envs import native
+from wsn_env.evaluation.native_envs import unwrap_native
 from wsn_env.scenario import Scenario
 
 WIDTHS = np.arange(-1.0, 4.5, 0.5)  # of beliefs, log2 of their rms over a scenario's typical error
@@ -29,9 +29,9 @@ class TrainingReward(gym.vector.VectorWrapper):
     """
 
     def __init__(self, envs: gym.vector.VectorEnv, scaled: bool = True, calibrated: bool = False) -> None:
-        if native(envs).interface.reward_space is not None:
+        if unwrap_native(envs).interface.reward_space is not None:
             raise ValueError("reward 'vector': learners need one number, 'error' or 'belief'")
-        if calibrated and native(envs).autoreset_mode == AutoresetMode.SAME_STEP:
+        if calibrated and unwrap_native(envs).autoreset_mode == AutoresetMode.SAME_STEP:
             raise ValueError("calibrated=True needs autoreset_mode Disabled or NextStep")
         super().__init__(envs)
         self._scaled, self._calibrated = scaled, calibrated
@@ -40,14 +40,14 @@ class TrainingReward(gym.vector.VectorWrapper):
 
     def step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """One period; the rewards are float32 copies."""
-        scenario, lam = native(self).scenario, native(self).lam.copy()
+        scenario, lam = unwrap_native(self).scenario, unwrap_native(self).lam.copy()
         observations, rewards, terminated, truncated, info = self.env.step(actions)
         if self._calibrated:
-            rewards = rewards + (self._ratio(info, scenario) - 1.0) * info["reward_error"]
+            rewards = rewards + (self._error_ratio(info, scenario) - 1.0) * info["reward_error"]
         scale = scenario.typical_cost(lam) if self._scaled else 1.0
         return observations, (rewards / scale).astype(np.float32), terminated, truncated, info
 
-    def _ratio(self, info: dict[str, Any], scenario: Scenario) -> np.ndarray:
+    def _error_ratio(self, info: dict[str, Any], scenario: Scenario) -> np.ndarray:
         """(B,) true over believed errors, after those of this period. Rows that only begin have neither."""
         width = np.log2(np.maximum(info["posterior_rms_m"] / scenario.typical_error_m, 1e-9))
         nearest = abs(WIDTHS[:, None] - width).argmin(axis=0)

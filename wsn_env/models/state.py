@@ -44,7 +44,7 @@ STATE = record(
         ("lam", "f8"),  # m/mJ
         ("log_miss", "f8"),  # log probability of having missed the target ever since the last report
         ("last_search", "i8"),  # period of the last search
-        ("luck", "u4"),  # a random number of the period, for policies that want one
+        ("random_bits", "u4"),  # a random 32-bit number of the period, for policies that want one
     ]
 )
 
@@ -101,9 +101,9 @@ class Belief(Arrays):
 
 @dataclass(frozen=True, eq=False)
 class Ledger(Arrays):
-    """Who paid in the last period."""
+    """The nodes charged in the last period."""
 
-    count: np.ndarray = array(np.int64, "rows")  # how many nodes did
+    count: np.ndarray = array(np.int64, "rows")  # how many they are
     payer: np.ndarray = array(np.int32, "rows", "nodes")  # the first `count`
     spent_j: np.ndarray = array(float, "rows", "nodes")  # J by node: exactly what the batteries lost
 

@@ -44,7 +44,7 @@ class Expectation:
         return bool(abs(self.measured - self.expected) <= self.tolerance)
 
 
-def verdict(plainly: bool, under_reading: bool) -> Verdict:
+def judge_claim(plainly: bool, under_reading: bool) -> Verdict:
     """Judge a claim.
 
     Args:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from wsn_env.bluetooth.calibration import NUMBERS, Calibration
-from wsn_env.bluetooth.packets import HeldOut, hold_out
+from wsn_env.bluetooth.calibration import SCALARS, Calibration
+from wsn_env.bluetooth.packets import HeldOut, held_out_residuals
 from wsn_env.evaluation.files import replacing
 from wsn_env.models.recordings.dataset import Track
 from wsn_env.reports.calibration_plots import draw_calibration
@@ -55,7 +55,7 @@ def quantity_rows(whole: Calibration, parts: Sequence[Calibration]) -> tuple[lis
     """The calibration's numbers with jackknife standard errors over the tracks; lists as their mean."""
     header = ["quantity", "meaning", "value", *(["standard error", "leaving out a track"] if parts else [])]
     rows = []
-    meanings = {name: meaning for name, (meaning, _) in NUMBERS.items()}
+    meanings = {name: meaning for name, (meaning, _) in SCALARS.items()}
     for name, meaning in (meanings | {"at_1m_db": "mean of P0, dBm", "exponents": "mean of n"}).items():
         row = [name, meaning, f"{_mean(whole, name):.4g}"]
         if parts:
@@ -69,7 +69,7 @@ def quantity_rows(whole: Calibration, parts: Sequence[Calibration]) -> tuple[lis
 def _markdown(tracks: Sequence[Track], whole: Calibration, parts: Sequence[Calibration]) -> list[str]:
     """Lines of calibration.md."""
     q, found, fitted = whole.quantities, whole.found, whole.found["autocovariance_fit"]
-    held = hold_out(tracks, whole, parts)
+    held = held_out_residuals(tracks, whole, parts)
     against = "the calibration that left out its track" if parts else "this calibration"
     lines = [
         "# Calibration",

@@ -81,8 +81,7 @@ def draw_bound_line(axes: Axes, evaluation: Evaluation) -> None:
     """A line at the mean error of a round Gaussian whose RMS is the bound with all nodes awake, if there is one."""
     all_awake_m = evaluation.bound_all_awake_m()
     if all_awake_m is not None:
-        kind = {"bound": "floor", "reference": "reference"}[bound_kind(evaluation.scenario)]
-        label = f"{kind}: all nodes, {all_awake_m:.3g} m RMS"
+        label = f"{bound_kind(evaluation.scenario)} with all nodes awake: {all_awake_m:.3g} m RMS"
         axes.axhline(ROUND * all_awake_m, color=BOUND, linewidth=1, linestyle=":", label=label)
 
 

@@ -47,7 +47,7 @@ def compare_at_equal_energy(evaluation: RecordedEvaluation, lam: float) -> list[
             continue
         energy, rms = evaluation.mean(policy, lam, "energy_mj"), evaluation.mean(policy, lam, "rms_m")
         for stem in stems:
-            there = evaluation.at_energy(stem, lam, energy)
+            there = evaluation.rms_at_energy_m(stem, lam, energy)
             if there is not None:
                 lines.append(
                     f"{policy}: {rms:.2f} m at {energy:.1f} mJ; {stem} at that energy, interpolated: {there:.2f} m"

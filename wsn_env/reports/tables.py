@@ -13,13 +13,13 @@ from wsn_env.simulation.bound import bound_kind
 if TYPE_CHECKING:
     from rich.console import Console
 
-HEADER = ("policy", "return", "{} minus it", "RMS m", "RMS / {}", "energy mJ/period", "awake", "lost")
+HEADER = ("policy", "return", "{} - policy", "RMS m", "RMS / {}", "energy mJ/period", "awake", "lost")
 
 
 def table_header(evaluation: Evaluation, reference: str) -> list[str]:
     """Names of the columns of `table_rows`."""
     kind = bound_kind(evaluation.scenario)
-    names = [name.format(reference if "minus" in name else kind) for name in HEADER]
+    names = [name.format(reference if name == "{} - policy" else kind) for name in HEADER]
     return [name for name in names if name != "RMS / none"]
 
 
@@ -91,7 +91,7 @@ def print_tables(evaluation: Evaluation, reference: str | None = None, console: 
     console = console or wide_console()
     for lam in evaluation.lams:
         title = f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes"
-        caption = f"means, 95 % bootstrap intervals; {reference} minus it: paired difference of returns"
+        caption = f"means, 95 % bootstrap intervals; {reference} - policy: paired difference of returns"
         lines = f"{caption}; {describe_bound(evaluation)}", *describe_best_in_hindsight(evaluation, lam)
         table = Table(title=title, caption="\n".join(lines))
         for name in table_header(evaluation, reference):

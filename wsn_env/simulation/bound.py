@@ -7,8 +7,8 @@ The recursion of Tichavsky, Muravchik & Nehorai (1998, eq. 21) for the constant 
 with H at the true state. It runs on P = J^-1, since G G' is singular. P0 is the first belief's covariance, and q the
 target's own acceleration noise, not the filter's.
 
-The *floor* is the same for a network in which every node is awake throughout and every report arrives. It depends on
-field, track and key alone, so that it is one number an episode, whatever the schedule.
+The *bound with all nodes awake* is the same for a network in which every node is awake throughout and every report
+arrives. It depends on field, track and key alone, so that it is one number an episode, whatever the schedule.
 
 Both are made of the truth: for loggers and tables, never for policies.
 """
@@ -69,7 +69,7 @@ def process_noise(scenario: Scenario) -> float:
 class Bound:
     """The bounds of B rows, a period after the other.
 
-    `begin` at the start of an episode, then `advance` once a period; `episode_m` and `floor_m` at its end.
+    `begin` at the start of an episode, then `advance` once a period; `episode_m` and `bound_all_awake_m` at its end.
     """
 
     def __init__(self, scenario: Scenario, rows: int = 1, threads: int = 1) -> None:
@@ -124,8 +124,8 @@ class Bound:
         """(B,) root of the mean square over the horizon of what `advance` has returned [m]."""
         return np.sqrt(self._memory["squares"] / self._periods)
 
-    def floor_m(self, state: State, rows: np.ndarray | None = None) -> np.ndarray:
-        """What all nodes would have told, awake throughout: the root of the mean square over the horizon [m].
+    def bound_all_awake_m(self, state: State, rows: np.ndarray | None = None) -> np.ndarray:
+        """The bound with all nodes awake throughout: the root of the mean square over the horizon [m].
 
         Args:
             state: in any period of the episode.
@@ -135,7 +135,7 @@ class Bound:
         """
         rows = np.ones(state.rows, bool) if rows is None else np.asarray(rows, bool)
         memory, threads = np.zeros(len(rows), MEMORY), threads_for(rows, self._threads)
-        over_rows(_play_floors, len(rows), threads, self._constants, self._start, rows, state.handle, memory)
+        over_rows(_play_all_awake, len(rows), threads, self._constants, self._start, rows, state.handle, memory)
         return np.sqrt(memory["squares"] / self._periods)
 
 
@@ -163,7 +163,7 @@ def _advance(start, stop, cs, outcomes, handle, memory, bound_m):
 
 
 @lean_kernel
-def _play_floors(start, stop, cs, starts, rows, handle, memory):
+def _play_all_awake(start, stop, cs, starts, rows, handle, memory):
     """A whole episode with all nodes awake, in the rows marked; `memory` holds what the last period leaves."""
     state, c = state_at(handle), cs[0]
     for b in range(start, stop):

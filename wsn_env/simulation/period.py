@@ -301,8 +301,8 @@ def _settle(episode, r, t):
     out.n_eff = belief.n_eff
     out.delivered = state.reports.count[b]
     out.alive = state.network.row[b].alive
-    luck = draws.bits(draws.stream(state.key[b], state.row[b].period, draws.POLICY), 0)
-    state.row[b].luck = np.uint32(luck >> np.uint64(32))
+    bits = draws.bits(draws.stream(state.key[b], state.row[b].period, draws.POLICY), 0)
+    state.row[b].random_bits = np.uint32(bits >> np.uint64(32))
     if t.walks:
         predict_walk(mean, cov, t, belief.predicted_mean, belief.predicted_cov)
     else:

@@ -61,9 +61,9 @@ class View:
         return self.row["lam"]
 
     @property
-    def luck(self) -> np.ndarray:
-        """(B,) uint32: a random number of the period."""
-        return self.row["luck"]
+    def random_bits(self) -> np.ndarray:
+        """(B,) uint32: a random 32-bit number of the period, for policies that want one."""
+        return self.row["random_bits"]
 
     @property
     def log_miss(self) -> np.ndarray:
@@ -181,7 +181,7 @@ class View:
         arrays = {
             "period": self.period.astype(np.int64),
             "lam": self.lam[:, None].copy(),
-            "luck": self.luck[:, None].astype(np.int64),
+            "random_bits": self.random_bits[:, None].astype(np.int64),
             "log_miss": self.log_miss[:, None].copy(),
             "mean": self.mean.copy(),
             "cov": self.cov.copy(),
@@ -208,7 +208,7 @@ class View:
         side = Grid.side(nodes)
         of_kinds = {"states": nodes if "bitmap" in a else 0, "receivers": nodes if HEARING[0] in a else 0}
         known = Knowledge.zeros(rows=rows, nodes=nodes, cells=side * side + 1, **of_kinds)
-        for name in ("period", "lam", "luck", "log_miss"):
+        for name in ("period", "lam", "random_bits", "log_miss"):
             known.row[name] = a[name].reshape(rows)
         for name in ("mean", "cov", "predicted_mean", "predicted_cov"):
             known.belief[name] = a[name]

@@ -67,7 +67,7 @@ class Camera:
         if self._window is not None:
             columns = ceil(state.rows**0.5)
             size = self.frame_px if columns == 1 else max(min(self.frame_px, WIDEST // columns), SMALLEST)
-            self._window.show(tiled(self.frames(state, size)))
+            self._window.show(tile_frames(self.frames(state, size)))
 
     def close(self) -> None:
         """Close the window."""
@@ -75,7 +75,7 @@ class Camera:
             self._window.close()
 
 
-def tiled(frames: tuple[np.ndarray, ...], gap: int = 2) -> np.ndarray:
+def tile_frames(frames: tuple[np.ndarray, ...], gap: int = 2) -> np.ndarray:
     """Frames (H, W, 3) row by row in one picture, about as many across as down."""
     columns = ceil(len(frames) ** 0.5)
     high, wide = frames[0].shape[:2]

@@ -41,8 +41,8 @@ class Canvas:
             hole: radius of what is left out.
             square: not round.
         """
-        colours = _numbers(colour).reshape(-1, 3)
-        strokes.draw_discs(self.image, self.clip, _points(centres), float(radius), float(hole), square, colours)
+        colours = _as_floats(colour).reshape(-1, 3)
+        strokes.draw_discs(self.image, self.clip, _as_points(centres), float(radius), float(hole), square, colours)
 
     def lines(self, starts: Any, ends: Any, width: Any, colour: Colour, opacity: Any = 1.0) -> None:
         """Lines with round ends; where they meet they do not darken each other.
@@ -53,18 +53,18 @@ class Canvas:
             colour: (3,).
             opacity: a number, or (N,) of each.
         """
-        starts, ends = _points(starts), _points(ends)
+        starts, ends = _as_points(starts), _as_points(ends)
         widths, opacities = (np.full(len(starts), value, np.float64) for value in (width, opacity))
         lines = starts, ends, widths, opacities
-        strokes.draw_lines(self.image, self._most, self.clip, lines, _numbers(colour))
+        strokes.draw_lines(self.image, self._most, self.clip, lines, _as_floats(colour))
 
     def cloud(self, x: np.ndarray, y: np.ndarray, weights: Any, colour: Colour) -> None:
         """Points (P,); where they are many, or their weights large, the colour is deeper."""
-        strokes.draw_cloud(self.image, self._most, self.clip, *map(_numbers, (x, y, weights, colour)))
+        strokes.draw_cloud(self.image, self._most, self.clip, *map(_as_floats, (x, y, weights, colour)))
 
     def shade(self, centres: Any, radius: float, tints: Any) -> None:
         """Areas within a radius of any of the centres (N, 2), in the n-th tint (K, 3) where n overlap."""
-        strokes.draw_shade(self.image, self._steps, self.clip, _points(centres), float(radius), _numbers(tints))
+        strokes.draw_shade(self.image, self._steps, self.clip, _as_points(centres), float(radius), _as_floats(tints))
 
     def box(self, left: int, top: int, right: int, bottom: int, colour: Colour) -> None:
         """A filled rectangle, right and bottom left out."""
@@ -74,7 +74,7 @@ class Canvas:
         """Words on their ground from the left at x, with their line's upper edge at y; returns where they end."""
         if not words:
             return x
-        line = _line(words, size, colour, ground)
+        line = _draw_words(words, size, colour, ground)
         area = self.image[y : y + line.shape[0], x : x + line.shape[1]]
         area[:] = line[: area.shape[0], : area.shape[1]]
         return x + line.shape[1]
@@ -82,7 +82,7 @@ class Canvas:
 
 def text_width(words: str, size: int) -> int:
     """What `Canvas.text` takes."""
-    return sum(_letter(letter, size).shape[1] for letter in words)
+    return sum(_draw_letter(letter, size).shape[1] for letter in words)
 
 
 def ellipse(centre: Any, axes: Any) -> np.ndarray:
@@ -95,27 +95,27 @@ def ellipse(centre: Any, axes: Any) -> np.ndarray:
     return np.asarray(centre) + CIRCLE @ np.asarray(axes).T
 
 
-def _numbers(values) -> np.ndarray:
+def _as_floats(values) -> np.ndarray:
     return np.ascontiguousarray(values, np.float64)
 
 
-def _points(values) -> np.ndarray:
-    return _numbers(values).reshape(-1, 2)
+def _as_points(values) -> np.ndarray:
+    return _as_floats(values).reshape(-1, 2)
 
 
 @lru_cache(maxsize=256)
-def _line(words: str, size: int, colour: Colour, ground: Colour) -> np.ndarray:
+def _draw_words(words: str, size: int, colour: Colour, ground: Colour) -> np.ndarray:
     """(height, width, 3) uint8: letters side by side."""
-    share = np.concatenate([_letter(letter, size) for letter in words], axis=1)[:, :, None]
+    share = np.concatenate([_draw_letter(letter, size) for letter in words], axis=1)[:, :, None]
     return (ground + share * (np.array(colour) - ground) + 0.5).astype(np.uint8)
 
 
 @lru_cache(maxsize=1024)
-def _letter(letter: str, size: int) -> np.ndarray:
+def _draw_letter(letter: str, size: int) -> np.ndarray:
     """(height, advance) float32: the share of each pixel that it covers."""
     from PIL import Image, ImageDraw
 
-    font = _font(size)
+    font = _load_font(size)
     width = 0.3 * size if letter == " " else font.getlength(letter) - 0.3
     image = Image.new("L", (ceil(width), ceil(1.3 * size)))
     ImageDraw.Draw(image).text((0, 0), letter, fill=255, font=font)
@@ -123,7 +123,7 @@ def _letter(letter: str, size: int) -> np.ndarray:
 
 
 @lru_cache(maxsize=16)
-def _font(size: int):
+def _load_font(size: int):
     from PIL import ImageFont
 
     return ImageFont.load_default(size)

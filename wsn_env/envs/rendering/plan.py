@@ -39,7 +39,7 @@ def plan_of(size: int, name: str, room_m: tuple[float, float], entries: tuple[tu
     font, unit = max(10, round(size / 40)), size / SIZE
     line = round(1.32 * font)
     edge = round(12 * unit) + 2
-    lines = _flowed(entries, font, size - font) if size >= WORDS_FROM else []
+    lines = _break_into_lines(entries, font, size - font) if size >= WORDS_FROM else []
     head = (2 if lines else 1) * line + font // 3
     low = size - len(lines) * line - (font // 2 if lines else 0)
     flash = max(2, round(4 * unit))
@@ -68,7 +68,7 @@ def legend(scenario: Scenario) -> tuple[tuple[str, str], ...]:
     entries = [("node", "node"), ("low", "battery low"), ("dead", "dead"), ("member", "awake")]
     entries += [("head", "head")] * (receiver == "head") + [("sink", "sink")] * (receiver == "sink")
     entries += [("radius", "sensing range")] * shows_radius(scenario)
-    entries += [("heard", _heard(scenario)), ("report", "report")]
+    entries += [("heard", _detection_words(scenario)), ("report", "report")]
     entries += [("handover", "handover")] * (receiver == "head")
     entries += [("cloud", "particles")] * (scenario.tracking.tracker == "particle")
     return (*entries, ("estimate", "estimate, 95 %"), ("target", "target"))
@@ -79,12 +79,12 @@ def shows_radius(scenario: Scenario) -> bool:
     return not scenario.measurement.lasting_errors and scenario.radius_m < max(scenario.field.room_m)
 
 
-def _heard(scenario: Scenario) -> str:
+def _detection_words(scenario: Scenario) -> str:
     verb = scenario.measurement.verb
     return "has heard" if verb == "reported" and scenario.radio.receiver == "target" else verb
 
 
-def _flowed(entries, font, width) -> list[list[tuple[int, str, str]]]:
+def _break_into_lines(entries, font, width) -> list[list[tuple[int, str, str]]]:
     """Entries of a legend by lines, with the x of each."""
     lines: list[list[tuple[int, str, str]]] = [[]]
     x = font // 2
@@ -133,9 +133,9 @@ def _draw_symbol(canvas, plan, symbol, centre) -> None:
 
 def _draw_ruler(canvas, plan, room_m) -> None:
     """A length below the field."""
-    wished = room_m[0] / 5
-    power = 10.0 ** np.floor(np.log10(wished))
-    length = max(step * power for step in (1, 2, 5) if step * power <= wished)
+    longest_m = room_m[0] / 5
+    power = 10.0 ** np.floor(np.log10(longest_m))
+    length = max(step * power for step in (1, 2, 5) if step * power <= longest_m)
     left, _, _, bottom = plan.field
     end = left + length * plan.scale
     y = bottom + plan.flash

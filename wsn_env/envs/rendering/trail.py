@@ -42,16 +42,16 @@ class Trail:
         self.last.row[rows] = outcome.row[rows]
         self.energy_mj[rows] = outcome.energy_mj[rows]
         self.squared_m2[rows] = 0.0
-        self._note(state, np.flatnonzero(rows))
+        self._record_estimate_and_head(state, np.flatnonzero(rows))
 
     def add(self, state: State, outcome: Outcome) -> None:
         """A period of all rows."""
         self.last.row[:] = outcome.row
         self.energy_mj += outcome.energy_mj
         self.squared_m2 += np.where(state.period > self.unscored, outcome.error_m**2, 0.0)
-        self._note(state, np.arange(state.rows))
+        self._record_estimate_and_head(state, np.arange(state.rows))
 
-    def _note(self, state: State, rows: np.ndarray) -> None:
+    def _record_estimate_and_head(self, state: State, rows: np.ndarray) -> None:
         period = np.minimum(state.period[rows], self.head.shape[1] - 1)
         self.estimate_m[rows, period] = self.last.estimate_m[rows]
         self.head[rows, period] = state.network.head[rows]

@@ -23,7 +23,7 @@ from wsn_env.papers.binary.readings import (
     take_snapshots,
 )
 from wsn_env.papers.binary.systems import FLIP, NODES, PERIODS_S, RADII_M, Results, Setting
-from wsn_env.papers.claim import HOLDS, NOT_REPRODUCED, Claim, Expectation, verdict
+from wsn_env.papers.claim import HOLDS, NOT_REPRODUCED, Claim, Expectation, judge_claim
 from wsn_env.papers.rollout import exceeds, keeps_falling, pooled_rms, standard_error
 
 DOUBT = 4.0  # standard errors that a figure of a sweep may be off
@@ -85,7 +85,7 @@ class Study:
 # --- figures expected -----------------------------------------------------------------------------------------
 
 
-def expected(study: Study) -> list[Expectation]:
+def list_expectations(study: Study) -> list[Expectation]:
     """Every expected figure."""
     return [*_closed_forms(), *_defaults(study.results), *_sweeps(study.results), *_readings(study)]
 
@@ -144,7 +144,7 @@ def _with_doubt(quantity: str, value: float, measured: float, error: float) -> E
 # --- what the paper claims ----------------------------------------------------------------------------------
 
 
-def claims(study: Study) -> list[Claim]:
+def judge_claims(study: Study) -> list[Claim]:
     """Every claim, judged."""
     results = study.results
     return [
@@ -161,7 +161,7 @@ def _lower_error(results: Results) -> Claim:
     holds = all(exceeds(errors["centroid"], errors[name]) for name in ("raw", "paper", "mid"))
     holds &= exceeds(errors["centroid_rls"], errors["paper"])
     what = "boundary nodes locate the target better than the centroid of all that detect"
-    return Claim(what, "better (a figure)", _means(errors), verdict(holds, holds))
+    return Claim(what, "better (a figure)", _means(errors), judge_claim(holds, holds))
 
 
 def _fewer_reports(results: Results) -> Claim:
@@ -169,7 +169,7 @@ def _fewer_reports(results: Results) -> Claim:
     energy = [results.energy_mj(Setting(name)).mean() for name in ("paper", "centroid")]
     ours = f"{nodes[0]:.2f} instead of {nodes[1]:.2f} nodes, {energy[0]:.2f} instead of {energy[1]:.2f} mJ a period"
     holds = bool(nodes[0] < nodes[1] and energy[0] < energy[1])
-    return Claim("fewer nodes report than with presence reports", "fewer (a figure)", ours, verdict(holds, holds))
+    return Claim("fewer nodes report than with presence reports", "fewer (a figure)", ours, judge_claim(holds, holds))
 
 
 def _sweep_claims(results: Results) -> Iterator[Claim]:
@@ -181,13 +181,13 @@ def _sweep_claims(results: Results) -> Iterator[Claim]:
         ours = "; ".join(f"{name} {_row(runs)}" for name, runs in errors.items()) + " m"
         falls = [keeps_falling(errors[name]) for name in ("paper", "raw")]
         claim = f"the error of the boundary method falls as the {what} grow{'s' if keyword == 'radius_m' else ''}"
-        yield Claim(claim, "falls (a figure)", ours, verdict(all(falls), falls[1]))
+        yield Claim(claim, "falls (a figure)", ours, judge_claim(all(falls), falls[1]))
         if keyword == "radius_m":
             first, *_, last = errors["centroid"]
             grows = exceeds(last, first)
             ours = f"centroid {_row(errors['centroid'])} m"
             claim = "the centroid degrades as the range R grows"
-            yield Claim(claim, "grows (a figure)", ours, verdict(grows, grows))
+            yield Claim(claim, "grows (a figure)", ours, judge_claim(grows, grows))
 
 
 def _settings(system: str, keyword: str, values: Iterable[float]) -> list[Setting]:
@@ -200,7 +200,7 @@ def _crossing(results: Results) -> Iterator[Claim]:
     near = abs(paper - CROSSING_S) <= 0.5
     ours = f"{_seconds(paper)} when it starts at the edge, {_seconds(inside)} when inside; v given: {_seconds(raw)}"
     what = "with T above 3.5 s the centroid is better than the paper's filter"
-    yield Claim(what, f"{CROSSING_S} s", ours, verdict(near and abs(inside - CROSSING_S) <= 0.5, near))
+    yield Claim(what, f"{CROSSING_S} s", ours, judge_claim(near and abs(inside - CROSSING_S) <= 0.5, near))
     fixes = results.rms_by_period_s("raw")
     its_fault = np.isfinite(raw) and raw <= CROSSING_S + 0.5
     ours = (
@@ -216,7 +216,7 @@ def _printed(study: Study) -> Claim:
     rms, mended = study.printed_rms_m(), study.results.rms_m(Setting("paper"))
     holds = rms < 2 * mended
     ours = f"RMS {rms:.0f} m: the velocity is never learnt; with P = F P F' first {mended:.2f} m"
-    return Claim("the recursion of eqs. 12-13 as printed follows the target", "yes", ours, verdict(holds, holds))
+    return Claim("the recursion of eqs. 12-13 as printed follows the target", "yes", ours, judge_claim(holds, holds))
 
 
 def _means(errors: dict[str, np.ndarray]) -> str:

@@ -32,7 +32,7 @@ SWEEPS: dict[str, tuple[str, tuple[float, ...], str]] = {  # file: field of a se
 }
 
 
-def write(out: Path, study: Study) -> None:
+def write_figures(out: Path, study: Study) -> None:
     """Every table and picture."""
     results = study.results
     write_sheet(out / "systems.csv", systems(results))

@@ -30,7 +30,7 @@ from pathlib import Path
 
 from wsn_env.evaluation.progress import Progress, progress_bar
 from wsn_env.papers.binary import figures
-from wsn_env.papers.binary.claims import Study, claims, expected
+from wsn_env.papers.binary.claims import Study, judge_claims, list_expectations
 from wsn_env.papers.binary.systems import play_paper
 from wsn_env.papers.claim import write_and_print_claims
 from wsn_env.papers.sheet import prepare_folder, print_sheet
@@ -42,10 +42,10 @@ def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
     with progress_bar(progress) as show:
         results = play_paper(runs, show)
     study = Study(results)
-    judged, expectations = claims(study), expected(study)
-    figures.write(out, study)
+    claims, expectations = judge_claims(study), list_expectations(study)
+    figures.write_figures(out, study)
     print_sheet("Systems", figures.systems(results), f"{runs} runs, 15 to 40 s")
     print_sheet("Readings", figures.readings(study), "fixes with the true velocity, well conditioned")
     caption = "flip: misread states; packet_success: of the only try of a report"
     print_sheet("Faults", figures.faults(results), caption)
-    write_and_print_claims(out, judged, expectations)
+    write_and_print_claims(out, claims, expectations)

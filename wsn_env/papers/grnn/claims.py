@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from wsn_env.papers.claim import Claim, Expectation, verdict
+from wsn_env.papers.claim import Claim, Expectation, judge_claim
 from wsn_env.papers.grnn.systems import ANCHORS, FILTERS, METHODS, PERIODS_S, Results
 from wsn_env.papers.rollout import Record, exceeds
 
@@ -32,7 +32,7 @@ EXPECTED_BOUND_M = 16.8
 ITERATION_SHARE = 0.05  # with a good start iterating changes less
 
 
-def expected(results: Results, widths: dict[str, tuple[float, float, int]]) -> list[Expectation]:
+def list_expectations(results: Results, widths: dict[str, tuple[float, float, int]]) -> list[Expectation]:
     """Every expected figure.
 
     Args:
@@ -74,7 +74,7 @@ def expected(results: Results, widths: dict[str, tuple[float, float, int]]) -> l
     ]
 
 
-def claims(results: Results, widths: dict[str, tuple[float, float, int]]) -> list[Claim]:
+def judge_claims(results: Results, widths: dict[str, tuple[float, float, int]]) -> list[Claim]:
     """Every claim, judged."""
     return [
         *_error_grows(results),
@@ -105,7 +105,7 @@ def _error_grows(results: Results) -> Iterator[Claim]:
         grows = [all(exceeds(_run_mse(b), _run_mse(a)) for a, b in zip(row, row[1:])) for row in (records, equal)]
         ours = f"{_row(records)} m at T = .1, .2, .5, 1 s; {_row(equal)} m where a second tells as much at any T"
         what = f"the error of {METHODS[method]} grows with the sampling period"
-        yield Claim(what, "grows", ours, verdict(all(grows), grows[0]))
+        yield Claim(what, "grows", ours, judge_claim(all(grows), grows[0]))
 
 
 def _crossover(results: Results) -> Claim:
@@ -120,7 +120,7 @@ def _crossover(results: Results) -> Claim:
         shown.append(f"{METHODS[method]} " + " ".join(f"{x:.1f}/{y:.1f}" for x, y in pairs))
     ours = "x/y [m] at T = .1, .2, .5, 1 s: " + "; ".join(shown)
     good = len(crossed) == len(FILTERS)
-    return Claim("the errors in x and y cross over at T = 0.5 s", "cross", ours, verdict(good, bool(crossed)))
+    return Claim("the errors in x and y cross over at T = 0.5 s", "cross", ours, judge_claim(good, bool(crossed)))
 
 
 def _combination(results: Results) -> Iterator[Claim]:
@@ -131,7 +131,7 @@ def _combination(results: Results) -> Iterator[Claim]:
         wins = [exceeds(_run_mse(b), _run_mse(a)) for a, b in zip(ours, theirs, strict=True)]
         text = f"GRNN + KF {_row(ours)} m, {METHODS[part]} {_row(theirs)} m at T = .1, .2, .5, 1 s"
         what = f"the combination of network and filter beats {METHODS[part]} alone"
-        yield Claim(what, "beats", text, verdict(all(wins), any(wins)))
+        yield Claim(what, "beats", text, judge_claim(all(wins), any(wins)))
 
 
 def _iteration(results: Results) -> Iterator[Claim]:
@@ -144,11 +144,11 @@ def _iteration(results: Results) -> Iterator[Claim]:
         )
         large = _gain(good[1], good[0]) < -ITERATION_SHARE  # a gain that one would notice
         what = f"iteration improves the cubature filter, {anchors}"
-        yield Claim(what, "improves", ours, verdict(all(better) and large, better[0]))
+        yield Claim(what, "improves", ours, judge_claim(all(better) and large, better[0]))
 
 
 def _fruit_flies(widths: dict[str, tuple[float, float, int]]) -> Claim:
     text = "{:.2f} dB, {:.2f} m after {} evaluations"
     ours = f"{text.format(*widths['foa'])}; golden section {text.format(*widths['golden'])}"
     found = widths["foa"][1] <= 1.001 * widths["golden"][1]
-    return Claim("fruit fly optimisation finds the network's best width", "finds it", ours, verdict(found, found))
+    return Claim("fruit fly optimisation finds the network's best width", "finds it", ours, judge_claim(found, found))

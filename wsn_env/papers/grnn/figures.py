@@ -26,7 +26,7 @@ LOOKS: dict[str, dict[str, Any]] = {
 TRACKED_S = 0.5
 
 
-def write(out: Path, results: Results) -> None:
+def write_figures(out: Path, results: Results) -> None:
     """Every figure's CSV and PNG."""
     start, path = error_after_start(results), tracks(results)
     write_sheet(out / "fig_start.csv", start)

@@ -34,7 +34,7 @@ from wsn_env.evaluation.progress import Progress, progress_bar
 from wsn_env.filters.fingerprint import training_of
 from wsn_env.papers.claim import write_and_print_claims
 from wsn_env.papers.grnn import figures
-from wsn_env.papers.grnn.claims import EXPECTED_RMSE_M, claims, expected
+from wsn_env.papers.grnn.claims import EXPECTED_RMSE_M, judge_claims, list_expectations
 from wsn_env.papers.grnn.pitfalls import pitfalls
 from wsn_env.papers.grnn.systems import (
     ANCHORS,
@@ -68,10 +68,10 @@ def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
     }
     for name, sheet in sheets.items():
         write_sheet(out / f"{name}.csv", sheet)
-    figures.write(out, results)
-    judged, expectations = claims(results, widths), expected(results, widths)
-    _print(sheets, runs)
-    write_and_print_claims(out, judged, expectations)
+    figures.write_figures(out, results)
+    claims, expectations = judge_claims(results, widths), list_expectations(results, widths)
+    _print_tables(sheets, runs)
+    write_and_print_claims(out, claims, expectations)
 
 
 def rmse(results: Results) -> Sheet:
@@ -99,7 +99,7 @@ def poor_start(results: Results) -> Sheet:
     return Sheet(("anchors", "start", "method", "rmse_m", "stderr_m"), rows)
 
 
-def _print(sheets: dict[str, Sheet], runs: int) -> None:
+def _print_tables(sheets: dict[str, Sheet], runs: int) -> None:
     rows = []
     for method in METHODS:
         cells = [row for row in sheets["rmse"].rows if row[0] == method]

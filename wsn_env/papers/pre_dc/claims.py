@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from wsn_env.papers.claim import Claim, Expectation, verdict
+from wsn_env.papers.claim import Claim, Expectation, judge_claim
 from wsn_env.papers.pre_dc.systems import MOTIONS, NODES, PARTICLES, Results
 from wsn_env.papers.rollout import Record, exceeds, keeps_falling
 from wsn_env.scenario import Scenario
@@ -37,7 +37,7 @@ EXPECTED_SHARE, PAPER_SHARE = 0.08, 0.15  # tolerances of a cell
 PROBABILITIES = ((8.0, 0.6, 1e-9), (10.0, 0.0812, 5e-5), (12.0, 0.0, 1e-9))  # distance m, p(d), tolerance
 
 
-def expected(results: Results) -> list[Expectation]:
+def list_expectations(results: Results) -> list[Expectation]:
     """Every expected figure: p(d), and each cell of Table 2 against our reading's and the paper's."""
     figures = [
         Expectation(f"p({d:g} m)", p, tolerance, float(detection_probability(d, Scenario())))
@@ -61,7 +61,7 @@ def expected(results: Results) -> list[Expectation]:
     return figures
 
 
-def claims(results: Results) -> list[Claim]:
+def judge_claims(results: Results) -> list[Claim]:
     """Every claim, judged."""
     return [
         *_static_is_worst(results),
@@ -88,7 +88,7 @@ def _static_is_worst(results: Results) -> Iterator[Claim]:
         own, common, paper, ours = _errors(results, nodes)
         worst = [all(exceeds(static, other) for other in others) for static, *others in (own, common)]
         what = f"Table 2, {nodes} nodes: static-cluster has a larger error than EKF and Pre-DC"
-        yield Claim(what, paper, ours, verdict(all(worst), worst[0]))
+        yield Claim(what, paper, ours, judge_claim(all(worst), worst[0]))
 
 
 def _pre_dc_is_best(results: Results) -> Iterator[Claim]:
@@ -96,7 +96,7 @@ def _pre_dc_is_best(results: Results) -> Iterator[Claim]:
         own, common, paper, ours = _errors(results, nodes)
         best = [all(exceeds(other, pre_dc) for other in others) for *others, pre_dc in (own, common)]
         what = f"Table 2, {nodes} nodes: Pre-DC has the lowest error"
-        yield Claim(what, paper, ours, verdict(all(best), best[0]))
+        yield Claim(what, paper, ours, judge_claim(all(best), best[0]))
 
 
 def _more_nodes_help(results: Results) -> Iterator[Claim]:
@@ -108,7 +108,7 @@ def _more_nodes_help(results: Results) -> Iterator[Claim]:
         ours = ", ".join(f"{rms.mean():.3f}" for rms in own) + " m; with one tracker "
         ours += ", ".join(f"{rms.mean():.3f}" for rms in common) + " m"
         what = f"Table 2: the error of {name} falls as nodes are added (81, 121, 169, 225)"
-        yield Claim(what, paper, ours, verdict(all(falls), falls[0]))
+        yield Claim(what, paper, ours, judge_claim(all(falls), falls[0]))
 
 
 def _energy(results: Results) -> Claim:
@@ -125,7 +125,7 @@ def _energy(results: Results) -> Claim:
         f"{rivals[0].mean():.3f} mJ, {rivals[0].mean() / ours.mean():.1f} times Pre-DC's"
     )
     what = "Fig. 4: the energy of Pre-DC in each period is clearly below that of static-cluster"
-    return Claim(what, "below (a figure)", text, verdict(all(below), below[1]))
+    return Claim(what, "below (a figure)", text, judge_claim(all(below), below[1]))
 
 
 def quarters(record: Record) -> np.ndarray:
@@ -141,7 +141,7 @@ def _stability(results: Results) -> Iterator[Claim]:
         ours = "RMS by quarter of the run " + ", ".join(f"{rms:.2f}" for rms in fitted) + " m"
         ours += "; with q = 0.02 and no search " + ", ".join(f"{rms:.3g}" for rms in plain) + " m"
         what = f"Figs. 5-6: the error stays stable on the track '{motion}'"
-        yield Claim(what, "stable (a figure)", ours, verdict(all(stable), stable[1]))
+        yield Claim(what, "stable (a figure)", ours, judge_claim(all(stable), stable[1]))
 
 
 def _particles(results: Results) -> Iterator[Claim]:
@@ -153,7 +153,7 @@ def _particles(results: Results) -> Iterator[Claim]:
         ours = f"{shown} m; flat within {FLAT:.0%} from {flat_from} particles on"
         good = exceeds(errors[PARTICLES[0]], errors[5000]) and flat_from <= 5000
         what = f"{figure}: the error in {name} falls with the number of particles and flattens by about 5000"
-        yield Claim(what, "falls, flat from about 5000 (a figure)", ours, verdict(good, good))
+        yield Claim(what, "falls, flat from about 5000 (a figure)", ours, judge_claim(good, good))
 
 
 def _flat(errors: np.ndarray, last: float) -> bool:

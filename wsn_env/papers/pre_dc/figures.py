@@ -34,7 +34,7 @@ TRACKS: dict[str, tuple[str, dict[str, Any]]] = {
 }
 
 
-def write(out: Path, results: Results) -> None:
+def write_figures(out: Path, results: Results) -> None:
     """Every figure's CSV and PNG."""
     detection = Detection()
     sheets = {

@@ -39,7 +39,7 @@ from pathlib import Path
 from wsn_env.evaluation.progress import Progress, progress_bar
 from wsn_env.papers.claim import write_and_print_claims
 from wsn_env.papers.pre_dc import figures
-from wsn_env.papers.pre_dc.claims import PAPER_RMS_M, claims, expected
+from wsn_env.papers.pre_dc.claims import PAPER_RMS_M, judge_claims, list_expectations
 from wsn_env.papers.pre_dc.systems import NODES, SAME_TRACKER, SYSTEMS, Results, play_paper
 from wsn_env.papers.rollout import standard_error
 from wsn_env.papers.sheet import Sheet, prepare_folder, print_table, write_sheet
@@ -51,12 +51,12 @@ def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
     with progress_bar(progress) as show:
         results = play_paper(runs, show)
     table, same = table2(results), same_tracker(results)
-    judged, expectations = claims(results), expected(results)
+    claims, expectations = judge_claims(results), list_expectations(results)
     write_sheet(out / "table2.csv", table)
     write_sheet(out / "same_tracker.csv", same)
-    figures.write(out, results)
-    _print(table, same, runs)
-    write_and_print_claims(out, judged, expectations)
+    figures.write_figures(out, results)
+    _print_tables(table, same, runs)
+    write_and_print_claims(out, claims, expectations)
 
 
 def table2(results: Results) -> Sheet:
@@ -80,7 +80,7 @@ def same_tracker(results: Results) -> Sheet:
     return Sheet(("policy", "rms_m", "stderr_m", "energy_mj"), rows)
 
 
-def _print(table: Sheet, same: Sheet, runs: int) -> None:
+def _print_tables(table: Sheet, same: Sheet, runs: int) -> None:
     rows = []
     for i in range(0, len(table.rows), len(SYSTEMS)):
         cells = table.rows[i : i + len(SYSTEMS)]

@@ -13,7 +13,7 @@ import numpy as np
 
 from wsn_env.models.acoustics import absorption_db_per_km
 from wsn_env.models.state import PURPOSES
-from wsn_env.papers.claim import Claim, Expectation, verdict
+from wsn_env.papers.claim import Claim, Expectation, judge_claim
 from wsn_env.papers.rollout import Record, exceeds, standard_error
 from wsn_env.papers.underwater.systems import (
     HYSTERESES_DB,
@@ -69,7 +69,7 @@ KNEE_DB = 88.0
 ENERGY_J = {"sensing": 0.76, "handover": 0.28, "report": 0.97, "broadcast": 0.088}  # a period at 85 dB, no hysteresis
 
 
-def expected(results: Results) -> list[Expectation]:
+def list_expectations(results: Results) -> list[Expectation]:
     """Every expected figure."""
     figures = [
         Expectation(f"absorption at {khz:g} kHz [dB/km]", alpha, 0.01, absorption_db_per_km(khz))
@@ -118,7 +118,7 @@ def energy_j(record: Record) -> dict[str, float]:
     return dict(zip(PURPOSES, (record.purposes_mj.mean(axis=(0, 1)) / 1e3).tolist(), strict=True))
 
 
-def claims(results: Results) -> list[Claim]:
+def judge_claims(results: Results) -> list[Claim]:
     """Every claim, judged."""
     return [
         _keeps_the_target(results),
@@ -156,7 +156,7 @@ def _keeps_the_target(results: Results) -> Claim:
         "(at least 15 %): smooth motion, 300 particles"
     )
     paper = "particle degeneracy is avoided"
-    return Claim(what, paper, "; ".join(parts), verdict(all(good.values()), good["carried"]))
+    return Claim(what, paper, "; ".join(parts), judge_claim(all(good.values()), good["carried"]))
 
 
 def _lowers_the_error(results: Results) -> Claim:
@@ -169,7 +169,7 @@ def _lowers_the_error(results: Results) -> Claim:
             parts.append(f"{particles} particles {handover} {means}")
     plainly, carried = all(good.values()), all(good["carried", n] for n in PARTICLES)
     what = "The improved resampling lowers the error where the motion is smooth"
-    return Claim(what, "higher accuracy", "mean RMS of a run: " + ", ".join(parts), verdict(plainly, carried))
+    return Claim(what, "higher accuracy", "mean RMS of a run: " + ", ".join(parts), judge_claim(plainly, carried))
 
 
 def _does_no_harm(results: Results) -> Claim:
@@ -183,7 +183,7 @@ def _does_no_harm(results: Results) -> Claim:
     under = low <= ratios[300, "carried"] <= high
     ours = ", ".join(f"{ratio:.3f} ({n} particles {handover})" for (n, handover), ratio in ratios.items())
     what = f"It does no harm where the motion is rough: RMSE of spread over systematic within {low}..{high}"
-    return Claim(what, "-", ours, verdict(good, under))
+    return Claim(what, "-", ours, judge_claim(good, under))
 
 
 def _handover_regularises(results: Results) -> Claim:
@@ -193,7 +193,7 @@ def _handover_regularises(results: Results) -> Claim:
     what = (
         "Handing over mean and covariance is itself a regulariser: systematic resampling, smooth motion, 300 particles"
     )
-    return Claim(what, "a handover of little data", ours, verdict(good, good))
+    return Claim(what, "a handover of little data", ours, judge_claim(good, good))
 
 
 def _silence(results: Results) -> Claim:
@@ -205,7 +205,7 @@ def _silence(results: Results) -> Claim:
         errors = f"{deaf.pooled_rms_m()[0]:.2f} -> {aware.pooled_rms_m()[0]:.2f} m"
         parts.append(f"{threshold_db:g} dB {errors} for {spent:.2f} of the energy")
     what = "That a member kept silent is information: the error falls at no energy"
-    return Claim(what, "-", "; ".join(parts), verdict(all(good), good[1]))
+    return Claim(what, "-", "; ".join(parts), judge_claim(all(good), good[1]))
 
 
 def _thresholds_save(results: Results) -> Claim:
@@ -215,7 +215,7 @@ def _thresholds_save(results: Results) -> Claim:
     good = bool(saved > 0.2 and worse < 0.2)
     ours = f"from 80 to {KNEE_DB:g} dB {100 * saved:.0f} % less energy for an error {100 * worse:.0f} % larger"
     what = "A threshold on reports saves energy at little loss"
-    return Claim(what, "members report above a threshold only", ours, verdict(good, good))
+    return Claim(what, "members report above a threshold only", ours, judge_claim(good, good))
 
 
 def knee_db(results: Results) -> float:
@@ -231,7 +231,7 @@ def _knee(results: Results) -> Claim:
     knee = knee_db(results)
     good = abs(knee - KNEE_DB) <= 2.0
     ours = f"farthest below the chord of energy against error: {knee:g} dB"
-    return Claim(f"{KNEE_DB:g} dB is the knee of the trade-off, within 2 dB", "-", ours, verdict(good, good))
+    return Claim(f"{KNEE_DB:g} dB is the knee of the trade-off, within 2 dB", "-", ours, judge_claim(good, good))
 
 
 def _hysteresis(results: Results) -> Claim:
@@ -245,4 +245,4 @@ def _hysteresis(results: Results) -> Claim:
         for db, r in records.items()
     )
     what = "A head that stays until another is 3 dB stronger halves the handovers at the same error"
-    return Claim(what, "-", ours, verdict(good, good))
+    return Claim(what, "-", ours, judge_claim(good, good))

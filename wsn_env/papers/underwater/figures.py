@@ -40,7 +40,7 @@ LOOKS: dict[str, dict[str, Any]] = {
 FREQUENCIES_KHZ = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 
 
-def write(out: Path, results: Results) -> None:
+def write_figures(out: Path, results: Results) -> None:
     """Every table as CSV, and three pictures."""
     sheets = {
         "acoustics": acoustics(),

@@ -30,7 +30,7 @@ from wsn_env.evaluation.progress import Progress, progress_bar
 from wsn_env.papers.claim import write_and_print_claims
 from wsn_env.papers.sheet import prepare_folder, print_sheet
 from wsn_env.papers.underwater import figures
-from wsn_env.papers.underwater.claims import claims, expected
+from wsn_env.papers.underwater.claims import judge_claims, list_expectations
 from wsn_env.papers.underwater.systems import play_system
 
 
@@ -39,9 +39,9 @@ def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
     prepare_folder(out)
     with progress_bar(progress) as show:
         results = play_system(runs, show)
-    judged, expectations = claims(results), expected(results)
-    figures.write(out, results)
+    claims, expectations = judge_claims(results), list_expectations(results)
+    figures.write_figures(out, results)
     print_sheet("Resampling", figures.resampling(results))
     print_sheet("Thresholds", figures.thresholds(results))
     print_sheet("Hysteresis of the head", figures.hysteresis(results))
-    write_and_print_claims(out, judged, expectations)
+    write_and_print_claims(out, claims, expectations)

@@ -69,7 +69,7 @@ def _comparison_sections(evaluation: Evaluation) -> list[str]:
     reference = evaluation.policies[0]
     parts = [
         f"<p>{evaluation.episodes:,} paired episodes of each policy and lam: all meet the same fields, tracks,"
-        f" detections and noises. Means with 95 % bootstrap intervals; <i>{html.escape(reference)} minus it</i> is the"
+        f" detections and noises. Means with 95 % bootstrap intervals; <i>{html.escape(reference)} - policy</i> is the"
         f" paired difference of returns. About the bound: {html.escape(describe_bound(evaluation))}.</p>"
     ]
     for lam in evaluation.lams:

@@ -60,19 +60,19 @@ def record(policies: dict[str, Policy], scenario: Scenario, seed: int) -> Record
         seed: of the episode.
     """
     world = World(scenario, threads=1)
-    played = [_played(name, policy, world, seed) for name, policy in policies.items()]
-    return Recording(played, _common(world.reset([draws.key_of_seed(seed)]), scenario, seed))
+    played = [_play_episode(name, policy, world, seed) for name, policy in policies.items()]
+    return Recording(played, _common_data(world.reset([draws.key_of_seed(seed)]), scenario, seed))
 
 
-def _played(name: str, policy: Policy, world: World, seed: int) -> Episode:
+def _play_episode(name: str, policy: Policy, world: World, seed: int) -> Episode:
     scenario = world.scenario
     frames, squares, joules, total = [], [], [], 0.0
 
-    def note(state: State, outcome: Outcome) -> None:
+    def add_frame(state: State, outcome: Outcome) -> None:
         frames.append(_frame(state, outcome, scenario))
 
-    for state, outcome in episodes(policy, world, [seed], begin=note):
-        note(state, outcome)
+    for state, outcome in episodes(policy, world, [seed], begin=add_frame):
+        add_frame(state, outcome)
         squares.append(outcome.error_m[0] ** 2)
         joules.append(outcome.energy_mj[0])
         total -= outcome.error_m[0] + state.lam[0] * outcome.energy_mj[0]
@@ -80,7 +80,7 @@ def _played(name: str, policy: Policy, world: World, seed: int) -> Episode:
     return Episode(name, frames, float(np.sqrt(np.mean(scored))), float(np.mean(joules)), float(total))
 
 
-def _common(state: State, scenario: Scenario, seed: int) -> dict[str, object]:
+def _common_data(state: State, scenario: Scenario, seed: int) -> dict[str, object]:
     width, depth = scenario.field.room_m
     whole = max(width, depth)
     receiver = scenario.radio.receiver
@@ -99,12 +99,12 @@ def _common(state: State, scenario: Scenario, seed: int) -> dict[str, object]:
         "receiver": receiver,
         "hue": HUES,
         "legend": [(symbol, words) for symbol, words in legend(scenario) if symbol in HUES] + searches,
-        "nodes": _steps(state.network.positions[0], whole),
-        "track": _steps(state.track[0, :, ::2], whole),
+        "nodes": _grid_steps(state.network.positions[0], whole),
+        "track": _grid_steps(state.track[0, :, ::2], whole),
     }
 
 
-def _steps(points: ArrayLike, whole: float, steps: int = FINE) -> list[int]:
+def _grid_steps(points: ArrayLike, whole: float, steps: int = FINE) -> list[int]:
     """Coordinates [m] as whole steps, x and y in turn."""
     return np.rint(np.asarray(points, float) * (steps / whole)).astype(int).ravel().tolist()
 
@@ -117,9 +117,9 @@ def _frame(state: State, outcome: Outcome, scenario: Scenario) -> dict[str, obje
     shown = slice(0, None, max(1, -(-x.shape[1] // CLOUD)))
     charged = state.ledger.payer[0, : state.ledger.count[0]]
     frame = {
-        "mean": _steps(belief["mean"][::2], whole),
+        "mean": _grid_steps(belief["mean"][::2], whole),
         "cov": [float(f"{belief['cov'][i, j]:.3g}") for i, j in ((0, 0), (0, 2), (2, 2))],
-        "cloud": _steps(np.clip(x[::2, shown].T, 0, whole), whole, COARSE),
+        "cloud": _grid_steps(np.clip(x[::2, shown].T, 0, whole), whole, COARSE),
         "head": int(network.head[0]),
         "members": network.members[0, : network.n_members[0]].tolist(),
         "heard": reports.node[0, : reports.count[0]].tolist(),

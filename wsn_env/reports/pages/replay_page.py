@@ -33,14 +33,14 @@ def replay(policies: dict[str, Policy], scenario: Scenario, seed: int, out: str 
     if seed < 0:
         raise ValueError(f"seed = {seed}: must be at least 0")
     recording = record(policies, scenario, seed)
-    page = build_page("replay", f"{scenario.name}, seed {seed}", player(recording))
+    page = build_page("replay", f"{scenario.name}, seed {seed}", player_html(recording))
     Path(out).parent.mkdir(parents=True, exist_ok=True)
     with replacing(out) as path:
         path.write_text(page, encoding="utf-8")
     return recording
 
 
-def player(recording: Recording) -> str:
+def player_html(recording: Recording) -> str:
     """HTML of the player for a page; a page has room for one."""
     data = recording.common | {"episodes": [vars(episode) for episode in recording.episodes]}
     return fill_template("player.html", data=json_for_script(data), script=read_template("player.js"))

@@ -14,7 +14,7 @@ from wsn_env.evaluation.progress import Progress
 from wsn_env.evaluation.rollout import episodes, evaluation_seeds
 from wsn_env.reports.pages.page import image, section
 from wsn_env.reports.pages.recording import record
-from wsn_env.reports.pages.replay_page import player
+from wsn_env.reports.pages.replay_page import player_html
 from wsn_env.reports.pictures import escape_label
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.world import World
@@ -45,7 +45,7 @@ def sample_sections(evaluation: Evaluation, policies: dict[str, Policy], progres
     beside = {policy: policies[policy] for policy in [first, *others[:1]]}
     shown = {policy: policies[policy] for policy in [first, *others][:SHOWN]}
     looked_at = seeds[:LOOKED_AT]
-    figure = _draw_histograms(_played(shown, scenario, looked_at, progress))
+    figure = _draw_histograms(_play_episodes(shown, scenario, looked_at, progress))
     return [
         section(
             "Errors and cluster sizes",
@@ -56,12 +56,14 @@ def sample_sections(evaluation: Evaluation, policies: dict[str, Policy], progres
             f"The worst episode of {first}",
             f"<p>Seed {seeds[worst]}, lam = {lam:g} m/mJ, return {returns[worst]:.1f} (mean {returns.mean():.1f})."
             " Click it, then space plays and arrows step.</p>",
-            player(record(beside, scenario, seeds[worst])),
+            player_html(record(beside, scenario, seeds[worst])),
         ),
     ]
 
 
-def _played(policies: dict[str, Policy], scenario: Scenario, seeds: Sequence[int], progress: Progress | None) -> Played:
+def _play_episodes(
+    policies: dict[str, Policy], scenario: Scenario, seeds: Sequence[int], progress: Progress | None
+) -> Played:
     """By policy, every period's error and how many nodes were awake."""
     world = World(scenario)
     played: Played = {}

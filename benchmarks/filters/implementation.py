@@ -1,4 +1,4 @@
-"""What a contestant is: a filter that walks through a problem's periods, again and again."""
+"""What an implementation is: a filter that walks through a problem's periods, again and again."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from benchmarks.filters.problem import PERIODS, Problem
 
 
 class Absent(Exception):
-    """A contestant cannot take part here; the text says why."""
+    """An implementation cannot take part here; the text says why."""
 
 
-class Contestant:
+class Implementation:
     """One filter step of every row a call: predict, weigh m reports, mean and covariance, N_eff, resample.
 
     Subclasses define `restart`, `advance` and `estimate`, and hold what they may prepare once.
@@ -47,10 +47,10 @@ class Contestant:
         self.period += 1
 
 
-class Looped(Contestant):
-    """A contestant without a batch form: one filter a row, in a Python loop."""
+class Looped(Implementation):
+    """An implementation without a batch form: one filter a row, in a Python loop."""
 
-    def __init__(self, kind: type[Contestant], problem: Problem):
+    def __init__(self, kind: type[Implementation], problem: Problem):
         self.problem = problem
         self.rows = [kind(problem.row(row)) for row in range(problem.rows)]
 
