@@ -46,10 +46,10 @@ class Greedy(ViewPolicy):
     terms: Sequence[Terms] | None = None  # None: tuned for the scenario's name; else usual ones
 
     def __post_init__(self) -> None:
-        given: Sequence[Any] | None = self.terms
-        if given is None:
-            given = tuned(self.scenario, "greedy") or [(self.scenario.lam_range[0], 3.0, 4.0)]
-        terms = tuple(sorted(Terms(*each) for each in given))
+        chosen: Sequence[Any] | None = self.terms
+        if chosen is None:
+            chosen = tuned(self.scenario, "greedy") or [(self.scenario.lam_range[0], 3.0, 4.0)]
+        terms = tuple(sorted(Terms(*each) for each in chosen))
         check_quantity("Greedy", "len(terms)", len(terms), at_least=1)
         for each in terms:
             check_quantity("Terms", "lam", each.lam, at_least=0)

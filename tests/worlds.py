@@ -223,5 +223,5 @@ def living_entries(state):
     stale = slots >= state.reports.count[:, None]
     state.reports.node[stale] = 0
     state.reports.value[stale] = 0
-    state.ledger.payer[slots >= state.ledger.count[:, None]] = 0
+    state.ledger.charged[slots >= state.ledger.count[:, None]] = 0
     return state

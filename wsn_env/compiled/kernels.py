@@ -109,9 +109,7 @@ class Kernel:
             self.call, result = store.open_kernel(self.py_func, self.targetoptions, arguments)
             return result
         kinds = arguments[self._place].dtype
-        known = next(
-            (made for made, other in list(self._made.values()) if other == kinds), None
-        )
+        known = next((made for made, other in list(self._made.values()) if other == kinds), None)
         if known is not None:  # another object of a type that is known
             self._made[id(kinds)] = known, kinds
             return known(*arguments)

@@ -104,7 +104,7 @@ class Ledger(Arrays):
     """The nodes charged in the last period."""
 
     count: np.ndarray = array(np.int64, "rows")  # how many they are
-    payer: np.ndarray = array(np.int32, "rows", "nodes")  # the first `count`
+    charged: np.ndarray = array(np.int32, "rows", "nodes")  # the first `count`
     spent_j: np.ndarray = array(float, "rows", "nodes")  # J by node: exactly what the batteries lost
 
 

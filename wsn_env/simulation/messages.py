@@ -37,7 +37,7 @@ def spend(node: Any, joules: float, purpose: Any, episode: Episode) -> bool:
     paid = before - battery[node]
     if paid > 0.0:
         if ledger.spent_j[b, node] == 0.0:
-            ledger.payer[b, ledger.count[b]] = node
+            ledger.charged[b, ledger.count[b]] = node
             ledger.count[b] += 1
         ledger.spent_j[b, node] += paid
         out.energy_j[purpose] += paid
@@ -49,7 +49,7 @@ def spend(node: Any, joules: float, purpose: Any, episode: Episode) -> bool:
 def clear_ledger(ledger: Any, b: int) -> None:
     """Forget the last period's payments."""
     for k in range(ledger.count[b]):
-        ledger.spent_j[b, ledger.payer[b, k]] = 0.0
+        ledger.spent_j[b, ledger.charged[b, k]] = 0.0
     ledger.count[b] = 0
 
 
@@ -170,7 +170,7 @@ def form(head: Any, chosen: np.ndarray, count: int, episode: Episode, r: Any) ->
     """Make the chosen cluster the standing one: handover from the old head, invitations to new members.
 
     Only members that hear their invitation join. A new head invites all of them. A sink or the target calls only who
-    has slept, the head like the others; its sending is not on the books.
+    has slept, the head like the others; its sending is not counted.
 
     Args:
         head: the new head, alive.

@@ -115,7 +115,7 @@ def _frame(state: State, outcome: Outcome, scenario: Scenario) -> dict[str, obje
     network, belief, reports = state.network, state.belief.row[0], state.reports
     x = state.belief.particles[0]
     shown = slice(0, None, max(1, -(-x.shape[1] // CLOUD)))
-    charged = state.ledger.payer[0, : state.ledger.count[0]]
+    charged = state.ledger.charged[0, : state.ledger.count[0]]
     frame = {
         "mean": _grid_steps(belief["mean"][::2], whole),
         "cov": [float(f"{belief['cov'][i, j]:.3g}") for i, j in ((0, 0), (0, 2), (2, 2))],
