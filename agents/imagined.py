@@ -72,7 +72,7 @@ def _draw_worlds(first, count, q, period_s, search_gap, handle, knowledge_handle
         own.predicted_mean[:], own.predicted_cov[:] = belief.predicted_mean, belief.predicted_cov
         if state.belief.particles.shape[2] > 0:
             redraw_row(key, 0, state.belief, b)
-        _copy_network(known.network, state.network, b)
+        _copy_network(known.network, state, b)
         state.reports.count[b] = 0
         state.reports.bitmap[b] = bitmap
         state.sensed[b] = bitmap
@@ -92,13 +92,17 @@ def _world_key(random_bits, number):
 
 
 @piece
-def _copy_network(network, copy, b):
-    """Batteries and the standing cluster; the rest has its place once `place_nodes` has been."""
+def _copy_network(network, state, b):
+    """Batteries, taken for what they are known to be, and the standing cluster; the rest has its place once
+    `place_nodes` has been."""
+    copy = state.network
     standing, count = copy.row[b], network.row[0].n_members
     standing.alive = network.row[0].alive
     standing.head = network.row[0].head
     standing.n_members = count
     copy.battery[b] = network.battery[0]
+    state.residual_j[b] = network.battery[0]
+    state.living[b] = network.row[0].alive
     copy.members[b, :count] = network.members[0, :count]
 
 

@@ -23,7 +23,7 @@ OUTCOMES = """error_m energy_mj energy_j spent_j members detections delivered dr
 posterior_rms_m believed_error_m alive target_m estimate_m""".split()
 VIEWED = "mean cov predicted_mean predicted_cov battery head member".split()
 GOLDEN = {
-    "PreDC-v0": "5033c208523356f4b3272ae43b4732ffbc9d999248f9c2f838f0c18db9e893ed",
+    "PreDC-v0": "346e8f0ac23abb47b017db93f73fe25799429b82416717d45f73e7f2379d2f8f",
     "Rssi-v0": "efe611ea1e981ddb3740e66680d5951fbef425bf1165ebf7d5584ffe4c326a45",
     "Binary-v0": "80f3a96dbc277155f7cc1020a286c30887180e4b584591f16be7f323cfe0dc24",
     "Anchors-v0": "0282a0b8404a233d8b2d7dd0ab40b791daf929f8c68c2bc7f1c8067958147b81",

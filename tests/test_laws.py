@@ -150,7 +150,8 @@ def test_the_truth_does_not_show(scenario, seed):
     policies = [make_policy(name, scenario) for name in HAND_WRITTEN]
     rng = np.random.default_rng(seed)
     for _, _, state, _ in play(scenario, keys_of(seed, 3), seed):
-        false = replace(state.copy(), track=rng.normal(0, 1e3, state.track.shape), key=keys_of(seed + 2, 3))
+        hidden = {"track": rng.normal(0, 1e3, state.track.shape), "residual_j": rng.random(state.residual_j.shape)}
+        false = replace(state.copy(), key=keys_of(seed + 2, 3), **hidden)
         false.row["last_search"] += 1
         for interface in interfaces:
             mine, theirs = View.of(state), View.of(false)
@@ -206,18 +207,21 @@ def rounding(scenario):
 @given(scenarios(), SEEDS)
 def test_batteries_lose_what_the_outcome_reports(scenario, seed):
     for before, _, state, outcome in play(scenario, keys_of(seed, 4), seed):
-        lost = before.network.battery - state.network.battery
+        lost = before.residual_j - state.residual_j
         np.testing.assert_allclose(lost, outcome.spent_j, rtol=0, atol=rounding(scenario))
         np.testing.assert_allclose(outcome.energy_j.sum(axis=1), outcome.spent_j.sum(axis=1), rtol=1e-12, atol=1e-18)
         np.testing.assert_allclose(outcome.energy_mj, 1e3 * outcome.energy_j.sum(axis=1), rtol=1e-12)
         assert (outcome.energy_j >= 0).all() and (outcome.spent_j >= 0).all()
-        assert (state.network.battery >= 0).all()
+        assert (state.residual_j >= 0).all()
 
         # The dead stay dead, spend nothing, lead nobody and report nothing.
-        dead = before.network.battery == 0
-        assert (state.network.battery[dead] == 0).all() and (outcome.spent_j[dead] == 0).all()
-        living = state.network.battery > 0
-        np.testing.assert_array_equal(state.network.alive, living.sum(axis=1))
+        dead = before.residual_j == 0
+        assert (state.residual_j[dead] == 0).all() and (outcome.spent_j[dead] == 0).all()
+        living = state.residual_j > 0
+        # The network may take a node for better off than it is, never for worse.
+        slack = rounding(scenario)
+        assert (state.network.battery >= state.residual_j - slack).all()
+        np.testing.assert_array_equal(state.network.alive, (state.network.battery > 0).sum(axis=1))
         np.testing.assert_array_equal(outcome.alive, living.sum(axis=1))
         for row in range(4):
             head = state.network.head[row]
@@ -236,7 +240,7 @@ def test_batteries_lose_what_the_outcome_reports(scenario, seed):
 def test_the_first_search_is_charged(scenario, seed):
     world, keys = World(scenario, threads=1), keys_of(seed, 4)
     state, outcome = world.restart(world.reset(keys), np.ones(4, bool), keys)
-    spent = scenario.radio.battery_j - state.network.battery
+    spent = scenario.radio.battery_j - state.residual_j
     np.testing.assert_allclose(spent, outcome.spent_j, rtol=0, atol=rounding(scenario))
     np.testing.assert_allclose(outcome.energy_j.sum(axis=1), outcome.spent_j.sum(axis=1), rtol=1e-12, atol=1e-18)
     np.testing.assert_array_equal(state.network.alive, (state.network.battery > 0).sum(axis=1))

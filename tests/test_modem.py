@@ -32,9 +32,9 @@ class Talk:
         self.state = self.world.reset([0])
 
     def step(self, head, *members):
-        before = self.state.network.battery.copy()
+        before = self.state.residual_j.copy()
         self.state, outcome = self.world.step(self.state, Cluster(np.array([head]), np.array([members], int)))
-        np.testing.assert_allclose(before - self.state.network.battery, outcome.spent_j, rtol=0, atol=5e-11)
+        np.testing.assert_allclose(before - self.state.residual_j, outcome.spent_j, rtol=0, atol=5e-11)
         np.testing.assert_allclose(outcome.energy_j.sum(axis=1), outcome.spent_j.sum(axis=1), rtol=1e-12)
         return outcome
 

@@ -60,7 +60,7 @@ def test_batteries_are_the_worlds_to_the_last_node(start, tmp_path):
         for node, battery in frame["left_j"]:
             left[node] = battery
     *_, (state, _) = episodes(policy, World(scenario), [SEED])
-    np.testing.assert_allclose(left, state.network.battery[0], rtol=1e-6)
+    np.testing.assert_allclose(left, state.residual_j[0], rtol=1e-6)
     assert (left == 0).any()
 
 

@@ -41,7 +41,7 @@ class Talk:
 
     def step(self, head, *members):
         """One period; returns the outcome after checking the books."""
-        before = self.state.network.battery.copy()
+        before = self.state.residual_j.copy()
         cluster = Cluster(np.full(self.rows, head), np.tile(np.array(members, int), (self.rows, 1)))
         self.state, outcome = self.world.step(self.state, cluster)
         balanced(before, self.state, outcome)
@@ -49,7 +49,7 @@ class Talk:
 
 
 def balanced(before, state, outcome):
-    np.testing.assert_allclose(before - state.network.battery, outcome.spent_j, rtol=0, atol=TINY)
+    np.testing.assert_allclose(before - state.residual_j, outcome.spent_j, rtol=0, atol=TINY)
     np.testing.assert_allclose(outcome.energy_j.sum(axis=1), outcome.spent_j.sum(axis=1), rtol=1e-12)
 
 
@@ -158,7 +158,7 @@ def test_a_search_wakes_everybody_at_the_receivers_cost():
     assert outcome.energy_j[0, SEARCH] == near(4 * rx(128) + reports)
     assert outcome.energy_j[0].sum() == near(4 * rx(128) + reports)
     np.testing.assert_allclose(outcome.spent_j[0, 1], rx(128) + tx(512, 10), atol=TINY)
-    np.testing.assert_allclose(1 - state.network.battery, outcome.spent_j, atol=TINY)
+    np.testing.assert_allclose(1 - state.residual_j, outcome.spent_j, atol=TINY)
 
 
 def test_a_search_under_a_sink_calls_everybody_once():
@@ -284,7 +284,7 @@ def test_under_a_sink_a_cluster_outlives_its_head():
     for receiver, left in (("sink", (1, [2, 3])), ("head", (-1, []))):
         talk = Talk(receiver=receiver, sensing_nj=1000.0)
         talk.step(0, 1, 2, 3)
-        talk.state.network.battery[0, 0] = 1e-9
+        talk.state.residual_j[0, 0] = talk.state.network.battery[0, 0] = 1e-9
         talk.step(0, 1, 2, 3)
         network = talk.state.network
         assert (network.head[0], network.members[0, : network.n_members[0]].tolist()) == left

@@ -119,7 +119,7 @@ def test_the_belief_restarts_at_the_centroid_of_the_detecting_nodes():
         state, outcome = world.step(state, cluster)
     assert (outcome.searched == 1).all()  # 0.16^4 < 1e-3
     assert before.belief.mean[0, 0] < 30
-    belief, particles = state.belief, world.scenario.tracking.particles
+    belief, particles, farther = state.belief, world.scenario.tracking.particles, []
     for b in range(20):
         n = state.reports.count[b]
         nodes = state.reports.node[b, :n]
@@ -133,14 +133,18 @@ def test_the_belief_restarts_at_the_centroid_of_the_detecting_nodes():
             assert abs(cloud[axis].mean() - belief.mean[b, axis]) < 5 * 10 / (n * particles) ** 0.5
             assert abs(cloud[axis].std() / (10 / n**0.5) - 1) < 5 / (2 * particles) ** 0.5
         np.testing.assert_array_equal(cloud[1::2], before.belief.particles[b, 1::2])  # q = 0
-        # The head is the detecting node with the strongest signal: the nearest.
+        # The head is the detecting node with the strongest signal: near, but not always the nearest, for strengths
+        # (25 log10 of the distance) have a noise of 3 dB.
         distance = np.linalg.norm(state.network.positions[b, nodes] - 85, axis=1)
-        assert state.network.head[b] == nodes[distance.argmin()]
+        place = list(nodes).index(state.network.head[b])
+        assert 25 * np.log10(distance[place] / max(distance.min(), 1.0)) < 4 * 3 * 2**0.5
+        farther.append(distance[place] > distance.min())
         assert state.network.n_members[b] == 0
         # The period's error is taken after the search.
         assert outcome.error_m[b] == pytest.approx(np.linalg.norm(belief.mean[b, ::2] - 85), rel=1e-12)
         np.testing.assert_allclose(state.belief.predicted_mean[b, 0], belief.mean[b, 0] + belief.mean[b, 1], rtol=1e-12)
     assert (state.log_miss == 0).all()
+    assert 0 < sum(farther) < 15  # of 20
 
 
 @pytest.mark.parametrize("measurement", ["rssi", "rssi_power"])
@@ -196,8 +200,8 @@ def test_a_restart_touches_the_marked_rows_only():
 
 def test_nobody_alive_searches_nothing():
     world, state = waiting(start_sd_m=30)
-    state.network.battery[:] = 0.0
-    state.network.alive[:] = 0
+    state.network.battery[:] = state.residual_j[:] = 0.0
+    state.network.alive[:] = state.living[:] = 0
     state, outcome = world.step(state, Cluster(np.zeros(1, int), np.ones((1, 1), int)))
     assert outcome.searched[0] == 0 and outcome.energy_j.sum() == 0
     assert state.network.head[0] == -1 and np.isfinite(outcome.error_m[0])

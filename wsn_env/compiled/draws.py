@@ -18,7 +18,7 @@ from wsn_env.compiled.kernels import kernel, piece
 
 # Purposes, one a use: adding one changes no other draw.
 FIELD, START, TRACK, LAM, DETECTION, MEASUREMENT, PACKET, PROCESS, RESAMPLING, RESTART, POLICY, CLOUD = range(12)
-SEARCH_PACKET, SPREAD, HANDOVER, MISREADING = range(12, 16)
+SEARCH_PACKET, SPREAD, HANDOVER, MISREADING, STRENGTH = range(12, 17)
 BEACON_FIELD, BEACON_DRIFT, BEACON_NOISE, BEACON_LOSS = range(16, 20)  # of receivers, for whole episodes
 
 GOLDEN = uint64(0x9E3779B97F4A7C15)

@@ -32,7 +32,7 @@ GRID = record([("x_m", "f8"), ("y_m", "f8"), ("cell_m", "f8"), ("side", "i8")])
 
 NETWORK = record(
     [
-        ("alive", "i8"),  # living nodes
+        ("alive", "i8"),  # nodes taken for alive
         ("head", "i8"),  # -1: none
         ("n_members", "i8"),
     ]
@@ -71,7 +71,10 @@ class Network(Arrays):
 
     row: np.ndarray = array(NETWORK, "rows")
     positions: np.ndarray = array(float, "rows", "nodes", 2)  # m, fixed for an episode
-    battery: np.ndarray = array(float, "rows", "nodes")  # J; a node is alive while it has any
+    battery: np.ndarray = array(
+        float, "rows", "nodes"
+    )  # J left as the network knows it: as last reported, less what it
+    # has seen spent since; a node is taken for alive while it has any
     members: np.ndarray = array(np.int32, "rows", "nodes")  # the first n_members ascending, without the head
     grid: Grid = part(Grid)
 
@@ -128,6 +131,8 @@ class State(Arrays):
     packets: np.ndarray = array(np.float32, "rows", "instants", "receivers", 2)  # mean level and number of the packets
     # in reach, drawn or recorded before the start, where the measurement has such
     sensed: np.ndarray = array(np.int8, "rows", "states")  # what each node sensed last, known to itself alone
+    residual_j: np.ndarray = array(float, "rows", "nodes")  # energy left in each node: it is alive while it has any
+    living: np.ndarray = array(np.int64, "rows")  # how many are
     ledger: Ledger = part(Ledger)
     row: np.ndarray = array(STATE, "rows")  # what the network knows beside the following
     network: Network = part(Network)

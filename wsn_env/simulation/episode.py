@@ -92,6 +92,8 @@ def begin(
             else:
                 scatter(field_stream, s.side_m, network.positions[b])
         index_nodes(network.positions[b], network.grid, b)
+        state.residual_j[b] = s.battery
+        state.living[b] = network.battery.shape[1]
         network.battery[b] = s.battery
         network.row[b].alive = network.battery.shape[1]
         network.row[b].head = -1

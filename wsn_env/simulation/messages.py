@@ -29,20 +29,46 @@ class Episode(NamedTuple):
 
 @lean_piece
 def spend(node: Any, joules: float, purpose: Any, episode: Episode) -> bool:
-    """Charge a node; what it cannot pay empties it. Returns whether it could pay in full."""
+    """Charge a node for what the network sees it do; what it cannot pay empties it. Returns whether it paid in full."""
+    note_spent(node, joules, episode)
+    return _charge(node, joules, purpose, episode)
+
+
+@lean_piece
+def _charge(node, joules, purpose, episode):
+    """The same of what the network does not see."""
     state, b, out = episode
-    battery, ledger = state.network.battery[b], state.ledger
-    before = battery[node]
-    battery[node] = max(before - joules, 0.0)
-    paid = before - battery[node]
+    residual_j, ledger = state.residual_j[b], state.ledger
+    before = residual_j[node]
+    residual_j[node] = max(before - joules, 0.0)
+    paid = before - residual_j[node]
     if paid > 0.0:
         if ledger.spent_j[b, node] == 0.0:
             ledger.charged[b, ledger.count[b]] = node
             ledger.count[b] += 1
         ledger.spent_j[b, node] += paid
         out.energy_j[purpose] += paid
-        state.network.row[b].alive -= battery[node] == 0.0
+        state.living[b] -= residual_j[node] == 0.0
     return before >= joules
+
+
+@lean_piece
+def note_spent(node: Any, joules: float, episode: Episode) -> None:
+    """The network has seen a node spend so much."""
+    _note_battery(node, max(episode.state.network.battery[episode.b, node] - joules, 0.0), episode)
+
+
+@lean_piece
+def note_residual(node: Any, episode: Episode) -> None:
+    """A node has reported what it has left, or that it has nothing left shows: it does not answer."""
+    _note_battery(node, episode.state.residual_j[episode.b, node], episode)
+
+
+@lean_piece
+def _note_battery(node, left_j, episode):
+    network, b = episode.state.network, episode.b
+    network.row[b].alive -= network.battery[b, node] > 0.0 and left_j == 0.0
+    network.battery[b, node] = left_j
 
 
 @lean_piece
@@ -63,20 +89,11 @@ def in_one_hop(node: Any, other: Any, positions: np.ndarray, r: Any) -> bool:
 def send(sender: Any, receiver: Any, bits: float, purpose: Any, episode: Episode, r: Any) -> bool:
     """One packet from node to node (eq. 5). Returns whether both could pay, so that it arrived if not lost."""
     state, b = episode.state, episode.b
-    positions, battery = state.network.positions[b], state.network.battery[b]
+    positions, residual_j = state.network.positions[b], state.residual_j[b]
     squared = squared_distance(positions, sender, positions[receiver, 0], positions[receiver, 1])
-    if battery[sender] <= 0.0 or not spend(sender, transmission(r, bits, squared), purpose, episode):
+    if residual_j[sender] <= 0.0 or not spend(sender, transmission(r, bits, squared), purpose, episode):
         return False
-    return battery[receiver] > 0.0 and spend(receiver, reception(r, bits), purpose, episode)
-
-
-@lean_piece
-def send_out(sender: Any, x: float, y: float, bits: float, purpose: Any, episode: Episode, r: Any) -> bool:
-    """One packet from a node to (x, y), out of the network (eq. 5). Returns whether the node could pay."""
-    state, b = episode.state, episode.b
-    squared = squared_distance(state.network.positions[b], sender, x, y)
-    living = state.network.battery[b, sender] > 0.0
-    return living and spend(sender, transmission(r, bits, squared), purpose, episode)
+    return residual_j[receiver] > 0.0 and spend(receiver, reception(r, bits), purpose, episode)
 
 
 @lean_piece
@@ -90,31 +107,40 @@ def outside(mean: np.ndarray, r: Any) -> tuple[float, float]:
 def report(node: Any, head: Any, packets: float, purpose: Any, episode: Episode, r: Any) -> bool:
     """A node's report with its retries. Returns whether it was received; to the head its own is free.
 
+    Lost tries cost energy, too, but who sent them is not known: it would tell who has detected the target.
+
     Args:
         packets: how many it is long.
 
     Beyond one hop nothing is sent: after a search the new head may lie so far, for a modem.
     """
     state, b = episode.state, episode.b
-    positions = state.network.positions[b]
+    positions, residual_j = state.network.positions[b], state.residual_j[b]
     if r.to_head:
         x, y = positions[head, 0], positions[head, 1]
-        if state.network.battery[b, head] <= 0.0 or node == head:
-            return state.network.battery[b, head] > 0.0
+        if residual_j[head] <= 0.0:
+            return False
+        if node == head:
+            note_residual(head, episode)
+            return True
     else:
         x, y = outside(state.belief.row[b].predicted_mean, r)
-    if squared_distance(positions, node, x, y) > r.hop_m * r.hop_m:
+    squared, bits = squared_distance(positions, node, x, y), packets * r.report_bits
+    if squared > r.hop_m * r.hop_m:
         return False
     packet = draws.SEARCH_PACKET if purpose == SEARCH else draws.PACKET
     stream = draws.stream(state.key[b], state.row[b].period, packet)
     for attempt in range(r.tries):
+        sent = residual_j[node] > 0.0 and _charge(node, transmission(r, bits, squared), purpose, episode)
         if r.to_head:
-            sent = send(node, head, packets * r.report_bits, purpose, episode, r)
-        else:
-            sent = send_out(node, x, y, packets * r.report_bits, purpose, episode, r)
+            sent = sent and residual_j[head] > 0.0 and _charge(head, reception(r, bits), purpose, episode)
         if not sent:
             return False
         if draws.uniform(stream, 16 * node + attempt) < r.packet_success:
+            note_residual(node, episode)  # what arrives also says what its sender has left, and how often it was tried
+            if r.to_head:
+                for _ in range(attempt + 1):
+                    note_spent(head, reception(r, bits), episode)
             return True
     return False
 
@@ -125,17 +151,17 @@ def broadcast(episode: Episode, r: Any) -> None:
     state, b = episode.state, episode.b
     network = state.network
     head, nodes, count = network.row[b].head, network.members[b], network.row[b].n_members
-    positions, battery = network.positions[b], network.battery[b]
+    positions, residual_j = network.positions[b], state.residual_j[b]
     farthest = -1.0
     for k in range(count):
-        if battery[nodes[k]] > 0.0:
+        if residual_j[nodes[k]] > 0.0:
             squared = squared_distance(positions, nodes[k], positions[head, 0], positions[head, 1])
             farthest = max(farthest, squared)
-    if farthest < 0.0 or battery[head] <= 0.0:
+    if farthest < 0.0 or residual_j[head] <= 0.0:
         return
     if spend(head, transmission(r, r.broadcast_bits, farthest), BROADCAST, episode):
         for k in range(count):
-            if battery[nodes[k]] > 0.0:
+            if residual_j[nodes[k]] > 0.0:
                 spend(np.int64(nodes[k]), reception(r, r.broadcast_bits), BROADCAST, episode)
 
 
@@ -146,11 +172,11 @@ def _hand_over(old, head, episode, r):
     Returns: as `send`.
     """
     state, b = episode.state, episode.b
-    positions, battery = state.network.positions[b], state.network.battery[b]
+    positions, residual_j = state.network.positions[b], state.residual_j[b]
     squared = squared_distance(positions, old, positions[head, 0], positions[head, 1])
-    if battery[old] <= 0.0 or not spend(old, relayed(r, r.handover_bits, squared), HANDOVER, episode):
+    if residual_j[old] <= 0.0 or not spend(old, relayed(r, r.handover_bits, squared), HANDOVER, episode):
         return False
-    return battery[head] > 0.0 and spend(head, reception(r, r.handover_bits), HANDOVER, episode)
+    return residual_j[head] > 0.0 and spend(head, reception(r, r.handover_bits), HANDOVER, episode)
 
 
 @lean_piece

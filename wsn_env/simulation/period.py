@@ -130,8 +130,8 @@ def _take_choice(head, chosen, episode, r):
     """Drop what cannot serve, then form the cluster."""
     state, b, out = episode
     network = state.network
-    standing, battery, predicted = network.row[b], network.battery[b], state.belief.row[b].predicted_mean
-    stands = standing.head >= 0 and battery[standing.head] > 0.0
+    standing, residual_j, predicted = network.row[b], state.residual_j[b], state.belief.row[b].predicted_mean
+    stands = standing.head >= 0 and residual_j[standing.head] > 0.0
     if head == KEEP_CLUSTER and stands:
         out.members = 1 + standing.n_members
         return
@@ -142,11 +142,13 @@ def _take_choice(head, chosen, episode, r):
     asked_for = 0
     for node in chosen:
         asked_for += node != -1
-    if head < 0 or head >= len(battery) or battery[head] <= 0.0:
+        if 0 <= node < len(residual_j) and residual_j[node] <= 0.0:
+            messages.note_residual(node, episode)  # it does not answer
+    if head < 0 or head >= len(residual_j) or residual_j[head] <= 0.0:
         out.dropped += head != KEEP_HEAD and head != KEEP_CLUSTER
-        head = standing.head if stands else nearest_living(network.positions[b], battery, predicted[0], predicted[2])
+        head = standing.head if stands else nearest_living(network.positions[b], residual_j, predicted[0], predicted[2])
     others = state.reports.node[b]  # room for a list: the last period's reports have done their service
-    count = _list_living(chosen, battery, others)
+    count = _list_living(chosen, residual_j, others)
     out.dropped += asked_for - count
     if head < 0:  # nobody is alive
         standing.head = -1
@@ -165,14 +167,14 @@ def _take_choice(head, chosen, episode, r):
 
 
 @lean_piece
-def _list_living(chosen, battery, found):
+def _list_living(chosen, residual_j, found):
     """The living among the chosen in ascending order, each once, in `found`; their number.
 
     Sorts by insertion: the chosen are few, or sorted.
     """
     count = 0
     for node in chosen:
-        if not 0 <= node < len(battery) or battery[node] <= 0.0:
+        if not 0 <= node < len(residual_j) or residual_j[node] <= 0.0:
             continue
         k = count
         while k > 0 and found[k - 1] > node:
@@ -190,7 +192,7 @@ def _list_living(chosen, battery, found):
 def wake(node: Any, purpose: Any, episode: Episode, r: Any) -> bool:
     """A node pays for being awake in this period. Returns whether it could."""
     state, b = episode.state, episode.b
-    return state.network.battery[b, node] > 0.0 and messages.spend(node, r.awake_j, purpose, episode)
+    return state.residual_j[b, node] > 0.0 and messages.spend(node, r.awake_j, purpose, episode)
 
 
 @lean_piece
@@ -198,12 +200,12 @@ def _sleep(episode, r):
     """All living nodes outside the cluster pay for the period, too."""
     state, b = episode.state, episode.b
     network, standing = state.network, state.network.row[b]
-    battery, members, j = network.battery[b], network.members[b], 0
-    for node in range(len(battery)):
+    residual_j, members, j = state.residual_j[b], network.members[b], 0
+    for node in range(len(residual_j)):
         while j < standing.n_members and members[j] < node:
             j += 1
         awake = node == standing.head or (j < standing.n_members and members[j] == node)
-        if not awake and battery[node] > 0.0:
+        if not awake and residual_j[node] > 0.0:
             messages.spend(node, r.asleep_j, messages.SENSING, episode)
 
 
@@ -211,7 +213,7 @@ def _sleep(episode, r):
 def sense(node: Any, head: Any, purpose: Any, target: Any, episode: Episode, c: Any) -> None:
     """An awake node's period: it reports what it has to tell, if anything."""
     state, b, out = episode
-    if state.network.battery[b, node] <= 0.0:
+    if state.residual_j[b, node] <= 0.0:
         return
     memory, reports = memory_of(state, b), state.reports
     sensor = node_at(state.network.positions[b], node)
@@ -288,7 +290,7 @@ def _settle(episode, r, t):
     state, b, out = episode
     belief, target = state.belief.row[b], target_of(state, b)
     mean, cov = belief.mean, belief.cov
-    _remove_dead_nodes(state.network, b, r)
+    _remove_dead_nodes(episode, r)
     total = 0.0
     for joules in out.energy_j:
         total += joules
@@ -300,7 +302,7 @@ def _settle(episode, r, t):
     out.believed_error_m = expected_error(cov[0, 0], cov[0, 2], cov[2, 2])
     out.n_eff = belief.n_eff
     out.delivered = state.reports.count[b]
-    out.alive = state.network.row[b].alive
+    out.alive = state.living[b]
     bits = draws.bits(draws.stream(state.key[b], state.row[b].period, draws.POLICY), 0)
     state.row[b].random_bits = np.uint32(bits >> np.uint64(32))
     if t.walks:
@@ -310,16 +312,20 @@ def _settle(episode, r, t):
 
 
 @lean_piece
-def _remove_dead_nodes(network, b, r):
+def _remove_dead_nodes(episode, r):
     """Take the dead out of the cluster. It ends with its head, unless the head is a node like the others."""
-    standing, battery, members = network.row[b], network.battery[b], network.members[b]
-    if standing.head >= 0 and battery[standing.head] <= 0.0:
+    network, b, residual_j = episode.state.network, episode.b, episode.state.residual_j[episode.b]
+    standing, members = network.row[b], network.members[b]
+    if standing.head >= 0 and residual_j[standing.head] <= 0.0:
+        messages.note_residual(standing.head, episode)
         standing.head = -1
         if r.to_head:
             standing.n_members = 0
     living = 0
     for k in range(standing.n_members):
-        if battery[members[k]] > 0.0:
+        if residual_j[members[k]] <= 0.0:
+            messages.note_residual(members[k], episode)
+        else:
             if standing.head < 0:
                 standing.head = members[k]
             else:

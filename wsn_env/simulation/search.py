@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 
-from wsn_env.compiled import draws
 from wsn_env.compiled.kernels import lean_kernel, lean_piece
 from wsn_env.models.measurement.base import Occasion, node_at, signal, tells
 from wsn_env.models.radio.base import reception
@@ -57,24 +56,23 @@ def _wake_all(episode, c):
     """
     state, b, out = episode
     network, standing = state.network, state.network.row[b]
-    positions, battery, members = network.positions[b], network.battery[b], network.members[b]
+    positions, residual_j, members = network.positions[b], state.residual_j[b], network.members[b]
     occasion, target = Occasion(state.key[b], state.row[b].period, True), target_of(state, b)
     call = reception(c.radio, c.radio.wakeup_bits)
-    measuring = draws.stream(occasion.key, occasion.period, draws.MEASUREMENT)
     strongest, best, j = -1, -np.inf, 0
     out.members = 0
-    for node in range(len(battery)):
+    for node in range(len(residual_j)):
         while j < standing.n_members and members[j] < node:
             j += 1
         awake = node == standing.head or (j < standing.n_members and members[j] == node)
-        if battery[node] <= 0.0 or not messages.spend(node, call, messages.SEARCH, episode):
+        if residual_j[node] <= 0.0 or not messages.spend(node, call, messages.SEARCH, episode):
             continue
         if not awake and not wake(node, messages.SEARCH, episode, c.radio):
             continue
         out.members += 1
         sensor = node_at(positions, node)
-        if battery[node] > 0.0 and tells(c.measurement, occasion, sensor, target[0], target[1], c):
-            strength = signal(c.measurement, measuring, sensor, target[0], target[1])
+        if residual_j[node] > 0.0 and tells(c.measurement, occasion, sensor, target[0], target[1], c):
+            strength = signal(c.measurement, occasion, sensor, target[0], target[1])
             if strength > best:
                 strongest, best = node, strength
     return strongest

@@ -187,7 +187,7 @@ class Measurement(Kind):
         return value
 
     @staticmethod
-    def signal(m: Any, stream: Any, node: Any, x: float, y: float) -> float:
+    def signal(m: Any, occasion: Occasion, node: Any, x: float, y: float) -> float:
         """How strong a node finds the target, for the choice of a head after a search: here alike everywhere."""
         return 0.0
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import F, log, log32
-from wsn_env.models.measurement.base import Line, Measurement, PositionBelief, level, level_slope
+from wsn_env.models.measurement.base import Line, Measurement, Occasion, PositionBelief, level, level_slope, sample
 
 if TYPE_CHECKING:
     from wsn_env.scenario import Scenario
@@ -109,10 +109,9 @@ class Level(Measurement):
         return (Line(level(m, squared), slope * dx, slope * dy, m.noise * m.noise),)
 
     @staticmethod
-    def signal(m: Any, stream: Any, node: Any, x: float, y: float) -> float:
-        noise, _ = draws.normal_pair(stream, node.number)
-        dx, dy = node.x - x, node.y - y
-        return level(m, dx * dx + dy * dy) + m.noise * noise
+    def signal(m: Any, occasion: Occasion, node: Any, x: float, y: float) -> float:
+        stream = draws.stream(occasion.key, occasion.period, draws.MEASUREMENT)
+        return sample(m, stream, node, x, y)[0]
 
     @staticmethod
     def weigh(m: Any, px: np.ndarray, py: np.ndarray, log_weights: np.ndarray, node: Any, value: Any) -> None:

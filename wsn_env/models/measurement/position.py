@@ -8,9 +8,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from wsn_env.compiled import draws
-from wsn_env.compiled.elementary import F
-from wsn_env.models.measurement.base import Line, Measurement, Order, PositionBelief
+from wsn_env.compiled.elementary import F, log
+from wsn_env.models.measurement.base import Line, Measurement, Occasion, Order, PositionBelief
 from wsn_env.models.quantity import quantity
+
+EXPONENT, NOISE_DB = 2.5, 3.0  # of a received strength, as Rssi has them
+LN_10 = 2.302585092994046
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,8 @@ class Position(Measurement):
         return Line(belief.x, 1.0, 0.0, variance), Line(belief.y, 0.0, 1.0, variance)
 
     @staticmethod
-    def signal(m: Any, stream: Any, node: Any, x: float, y: float) -> float:
+    def signal(m: Any, occasion: Occasion, node: Any, x: float, y: float) -> float:
+        """The received strength [dB], eq. 1 in its log-distance form."""
         dx, dy = node.x - x, node.y - y
-        return -(dx * dx + dy * dy)
+        noise, _ = draws.normal_pair(draws.stream(occasion.key, occasion.period, draws.STRENGTH), node.number)
+        return NOISE_DB * noise - 5.0 * EXPONENT / LN_10 * log(max(dx * dx + dy * dy, 1.0))

@@ -10,7 +10,7 @@ import numpy as np
 from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import F, exp, exp32, log, log32
 from wsn_env.compiled.kernels import lean_piece
-from wsn_env.models.measurement.base import Line, Measurement, PositionBelief
+from wsn_env.models.measurement.base import Line, Measurement, Occasion, PositionBelief, sample
 from wsn_env.models.quantity import quantity
 
 if TYPE_CHECKING:
@@ -61,10 +61,9 @@ class RssiPower(Measurement):
         return power(m, dx * dx + dy * dy) + m.noise * noise, 0.0
 
     @staticmethod
-    def signal(m: Any, stream: Any, node: Any, x: float, y: float) -> float:
-        noise, _ = draws.normal_pair(stream, node.number)
-        dx, dy = node.x - x, node.y - y
-        return power(m, dx * dx + dy * dy) + m.noise * noise
+    def signal(m: Any, occasion: Occasion, node: Any, x: float, y: float) -> float:
+        stream = draws.stream(occasion.key, occasion.period, draws.MEASUREMENT)
+        return sample(m, stream, node, x, y)[0]
 
     @staticmethod
     def linearise(m: Any, node: Any, belief: PositionBelief) -> tuple[Any, ...]:

@@ -123,7 +123,7 @@ def _frame(state: State, outcome: Outcome, scenario: Scenario) -> dict[str, obje
         "head": int(network.head[0]),
         "members": network.members[0, : network.n_members[0]].tolist(),
         "heard": reports.node[0, : reports.count[0]].tolist(),
-        "left_j": [[int(node), float(f"{network.battery[0, node]:.7g}")] for node in charged],
+        "left_j": [[int(node), float(f"{state.residual_j[0, node]:.7g}")] for node in charged],
         "error": round(float(outcome.error_m[0]), 3),
         "energy": round(float(outcome.energy_mj[0]), 5),
         "awake": int(outcome.members[0]),
