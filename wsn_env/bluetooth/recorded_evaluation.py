@@ -84,7 +84,7 @@ class RecordedEvaluation:
             path.write_text(json.dumps({"tracks": settings, "versions": versions()}, indent=1))
 
 
-def evaluate_recorded(
+def evaluate_recorded(  # noqa: PLR0913
     policies: Sequence[str],
     scenario: Scenario,
     folder: str | Path,

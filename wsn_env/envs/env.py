@@ -46,7 +46,7 @@ class ClusterEnv(gym.Env):
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": FPS}
 
-    def __init__(
+    def __init__(  # noqa: PLR0913
         self,
         scenario: str | Scenario = "PreDC-v0",
         action: ActionName = "menu",

@@ -42,7 +42,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
 
-    def __init__(
+    def __init__(  # noqa: PLR0913
         self,
         num_envs: int = 1,
         scenario: str | Scenario = "PreDC-v0",

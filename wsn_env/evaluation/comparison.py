@@ -151,7 +151,7 @@ def stem_of(policy: str) -> str:
     return policy.rstrip("0123456789")
 
 
-def evaluate(
+def evaluate(  # noqa: PLR0913
     policies: Sequence[str] | dict[str, Policy],
     scenario: Scenario,
     lams: Sequence[float] | None = None,

@@ -107,7 +107,7 @@ class RayTraining:
         training: more of RLlib's `training`: lr, gamma, ...
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913
         self,
         make_rows: Callable[[int], gym.vector.VectorEnv],
         entries: dict[str, Any],

@@ -22,7 +22,7 @@ def quantity(default: Any, meaning: str, **allowed: Any) -> Any:
     return field(default=default, metadata={"meaning": meaning, "allowed": allowed})
 
 
-def check_quantity(
+def check_quantity(  # noqa: PLR0913
     owner: str,
     name: str,
     value: Any,
