@@ -1,5 +1,6 @@
 """Links and code samples of the documents."""
 
+import importlib
 import re
 from pathlib import Path
 from pkgutil import resolve_name
@@ -57,10 +58,14 @@ def test_the_readme_is_short():
     assert len((ROOT / "README.md").read_text().splitlines()) < 120
 
 
-def test_every_scenario_and_policy_has_its_page():
-    pages = {path.read_text().splitlines()[0].removeprefix("# ") for path in (ROOT / "docs" / "scenarios").glob("*.md")}
-    assert pages == set(IDS)
-    told = (ROOT / "docs" / "policies.md").read_text()
+def test_every_scenario_and_policy_has_its_page(monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    importlib.import_module("scenarios").write_pages(tmp_path)
+    pages = {path.stem: path.read_text() for path in tmp_path.glob("*.md")}
+    assert set(pages) == set(IDS)
+    for name, page in pages.items():
+        assert page.startswith(f"# {name}\n") and "What matters:" in page and f".. quantities:: {name}\n" in page
+    text = (ROOT / "docs" / "policies.md").read_text()
     families = {name.rstrip("0123456789") for name in policy_names()}
     entry = r"\n## {0}\d?\n((?!\n## ).)*_generated/policy_{0}\d?\.png"
-    assert not [name for name in families if not re.search(entry.format(name), told, re.S)]
+    assert not [name for name in families if not re.search(entry.format(name), text, re.S)]

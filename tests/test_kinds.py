@@ -216,7 +216,7 @@ def test_a_kind_that_lacks_a_function_is_refused_when_the_environment_is_made():
 
     with pytest.raises(ScenarioError, match=r"Silent has no log_likelihood"):
         gym.make("wsn_env/PreDC-v0", measurement=Silent())
-    with pytest.raises(ScenarioError, match="must be a Beacon or Binary or Position"):
+    with pytest.raises(ScenarioError, match="must be a Beacon or .* or Sonar"):
         gym.make("wsn_env/PreDC-v0", measurement=object())
 
 

@@ -71,7 +71,7 @@ def describe_belief(outlook: Outlook, row: Any, reports: int, radius_m: float, f
     f[9] = 0.2 * row.log_miss
     f[10] = 0.25 * reports
     if head.node >= 0:
-        _write_place(head, outlook, heading, radius_m, f, 11)
+        _write_place(head, outlook, heading, radius_m, f[11:13])
         dx, dy = (head.x - outlook.mean[0]) / radius_m, (head.y - outlook.mean[2]) / radius_m
         f[13] = np.sqrt(dx * dx + dy * dy)
         f[14] = head.detection
@@ -86,11 +86,11 @@ def describe_belief(outlook: Outlook, row: Any, reports: int, radius_m: float, f
 
 
 @lean_piece
-def _write_place(node, outlook, heading, radius_m, f, at):
-    """f[at], f[at + 1]: where a node stands from the prediction, in radii along and across the velocity."""
+def _write_place(node, outlook, heading, radius_m, f):
+    """f (2,): where a node stands from the prediction, in radii along and across the velocity."""
     dx, dy = (node.x - outlook.mean[0]) / radius_m, (node.y - outlook.mean[2]) / radius_m
-    f[at] = dx * heading.x + dy * heading.y
-    f[at + 1] = dy * heading.x - dx * heading.y
+    f[0] = dx * heading.x + dy * heading.y
+    f[1] = dy * heading.x - dx * heading.y
 
 
 @lean_piece
@@ -125,7 +125,7 @@ def describe_candidate(outlook: Outlook, place: int, heading: Heading, radius_m:
     """
     nodes, node = outlook.nodes, outlook.nodes[place]
     head, p = nodes[outlook.candidates], position_cov(outlook.cov)
-    _write_place(node, outlook, heading, radius_m, g, 0)
+    _write_place(node, outlook, heading, radius_m, g[:2])
     g[2] = node.distance_m / radius_m
     g[3] = node.detection
     if head.node >= 0:

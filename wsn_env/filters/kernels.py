@@ -88,7 +88,7 @@ def moments(x: np.ndarray, weights: np.ndarray, reference: Any, mean: np.ndarray
         for k in range(LANES):
             _gather(weights[o + k], px[o + k] - r0, vx[o + k] - r1, py[o + k] - r2, vy[o + k] - r3, lanes, k)
     for i in range(whole, n):
-        _gather(weights[i], px[i] - r0, vx[i] - r1, py[i] - r2, vy[i] - r3, lanes, 0)
+        _gather(weights[i], px[i] - r0, vx[i] - r1, py[i] - r2, vy[i] - r3, lanes, np.int64(0))
     s = np.zeros(SUMS)
     for row in range(SUMS):
         for k in range(LANES):

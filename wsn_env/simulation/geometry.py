@@ -87,7 +87,7 @@ def nearest_candidates(network: Any, b: int, x: float, y: float, nodes: np.ndarr
             for j in range(column - ring, column + ring + 1, stride):
                 if 0 <= j < side:
                     for slot in range(starts[i * side + j], starts[i * side + j + 1]):
-                        node = sorted_nodes[slot]
+                        node: Any = np.int64(sorted_nodes[slot])
                         d2 = squared_distance(positions, node, x, y)
                         if d2 <= distances[-1] and battery[node] > 0.0:
                             _insert(node, d2, nodes, distances)

@@ -154,7 +154,7 @@ def _take_choice(head, chosen, episode, r):
         standing.head = -1
         standing.n_members = 0
         return
-    kept = 0
+    kept: Any = np.int64(0)  # not a literal: for one Numba would compile `form` once more
     for k in range(count):
         if others[k] != head:
             if messages.in_one_hop(others[k], head, network.positions[b], r):
