@@ -7,15 +7,28 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from wsn_env import Scenario, View, make_policy
+from wsn_env import Scenario, View, World, make_policy
 from wsn_env.evaluation.comparison import COLUMNS, Evaluation, evaluate
 from wsn_env.evaluation.intervals import Summary
-from wsn_env.evaluation.rollout import BLOCK, evaluation_seeds
+from wsn_env.evaluation.rollout import BLOCK, evaluation_seeds, rollout
 from wsn_env.reports.pictures import write_picture
 from wsn_env.reports.plots import draw_comparison
 from wsn_env.reports.tables import format_markdown, print_tables, save_markdown
 
 SCENARIO = Scenario.named("PreDC-v0", particles=60, nodes=40, side_m=50.0, crossing_m=20.0, periods=8)
+
+
+KALMAN = dict(tracker="ekf", search=False, side_m=5000.0, radius_m=20_000.0, ceiling=1.0, softness=0.01, nodes=20)
+
+
+@pytest.mark.parametrize("q, low, high", [(0.1, 0.0, 0.0), (0.02, 0.5, 3.0)])
+def test_anees_is_one_where_a_kalman_filters_model_is_right_and_more_where_it_is_too_sure(q, low, high):
+    """Positions from everywhere and white acceleration of .1 m/s^2, so that the filter is exact at q = .1."""
+    scenario = Scenario.named("PreDC-v0", acceleration_ms2=0.1, filter_q=q, periods=40, **KALMAN)
+    rows = rollout(make_policy("nearest1", scenario), World(scenario, threads=1), range(300))
+    anees = np.array([row["anees"] for row in rows])
+    slack = 4 * anees.std() / len(anees) ** 0.5
+    assert 1 + low - slack < anees.mean() < 1 + high + slack
 
 
 @pytest.fixture(scope="module")
@@ -31,11 +44,14 @@ def test_a_row_replays_in_the_environment(evaluation):
         ).unwrapped
         policy = make_policy(row["policy"], SCENARIO)
         observation, _ = env.reset(seed=row["seed"])
-        infos, total = [], 0.0
+        infos, total, nees = [], 0.0, []
         for _ in range(row["periods"]):
             observation, reward, *_, info = env.step(policy.predict(observation)[0])
             infos.append(info)
             total += reward
+            offset, cov = info["estimate_m"] - info["target_m"], observation["cov"][::2, ::2]
+            nees.append(offset @ np.linalg.solve(cov, offset) / 2)
+        assert row["anees"] == pytest.approx(np.mean(nees), rel=1e-9)
         assert row["return"] == pytest.approx(total, rel=1e-12)
         assert row["error_m"] == pytest.approx(np.mean([info["error_m"] for info in infos]), rel=1e-12)
         assert row["rms_m"] == pytest.approx(info["episode_rms_m"], rel=1e-12)

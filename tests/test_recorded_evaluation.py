@@ -195,7 +195,7 @@ def test_the_published_tracks_give_the_figures_of_the_study():
     found = evaluate_recorded(policies, Scenario.named("Ble-v0"), folder, seeds=20)
     rms = {policy: found.mean(policy, 0.006, "rms_m") for policy in policies}
     assert rms["all"] == pytest.approx(1.68, abs=0.06)
-    assert 0.6 <= found.mean("all", 0.006, "anees") <= 1.6
+    assert 0.6 <= found.mean("all", 0.006, "variance_ratio") <= 1.6
     assert rms["informed5"] <= 1.10 * rms["all"]
     assert rms["informed3"] <= 1.20 * rms["all"]
     assert rms["informed2"] <= min(2.2, 0.96 * rms["quadrants:n=2"])

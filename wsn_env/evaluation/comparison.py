@@ -31,7 +31,7 @@ from wsn_env.simulation.bound import bound_kind
 
 COLUMNS = (
     "policy scenario lam episode seed periods return error_m rms_m energy_mj members handovers searches lost"
-    " bound_m bound_all_awake_m anees"
+    " bound_m bound_all_awake_m anees variance_ratio"
 ).split()
 Row = dict[str, str | float]  # of the columns in COLUMNS
 MEANS = ("return", "rms_m", "error_m", "energy_mj", "members", "handovers", "searches", "lost")

@@ -64,18 +64,23 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
         world: of a scenario with one lam.
         seeds: reset seeds, one a row.
 
-    Returns: the measured columns of each episode, and the sums that its return is made of. `anees` is the mean of the
-    squared error over what the belief takes it to be, the trace of its position covariance: 1 where the filter is
-    honest, more where it is too sure.
+    Returns: the measured columns of each episode, and the sums that its return is made of. `anees` is the average
+    normalised estimation error squared of the position (Bar-Shalom, Li & Kirubarajan, 2001, sec. 5.4), e' P^-1 e / 2:
+    1 where the filter is honest, more where it is too sure. `variance_ratio` is the mean of e' e / trace(P), which one
+    thin direction of P cannot dominate.
     """
     scenario = world.scenario
     names = "error", "square", "energy", "members", "handovers", "searches", "lost"
     sums: dict[str, Any] = dict.fromkeys(names, 0.0)
     counted_periods, ratios = np.zeros(len(seeds)), np.zeros(len(seeds))
+    regular_periods, nees_sums = np.zeros(len(seeds)), np.zeros(len(seeds))
     bound = None if bound_kind(scenario) == "none" else Bound(scenario, len(seeds), world.threads)
     begin = None if bound is None else lambda state, _: bound.begin(state)
     for state, outcome in episodes(policy, world, seeds, begin):
         square, believed = outcome.error_m**2, outcome.posterior_rms_m**2
+        nees, regular = _position_nees(state, outcome)
+        nees_sums += nees
+        regular_periods += regular
         sums["error"] += outcome.error_m
         if state.period[0] > scenario.unscored:
             sums["square"] += square
@@ -104,9 +109,21 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
         "lost": sums["lost"].astype(int),
         "bound_m": np.full(len(seeds), "") if bound is None else bound.episode_m(),
         "bound_all_awake_m": np.full(len(seeds), "") if bound is None else bound.bound_all_awake_m(state),
-        "anees": ratios / np.maximum(counted_periods, 1),
+        "anees": nees_sums / np.maximum(regular_periods, 1),
+        "variance_ratio": ratios / np.maximum(counted_periods, 1),
     }
     return [{name: values[i].item() for name, values in columns.items()} for i in range(len(seeds))]
+
+
+def _position_nees(state: State, outcome: Outcome) -> tuple[np.ndarray, np.ndarray]:
+    """(B,) e' P^-1 e / 2 of the position in a period, 0 where P has no inverse; (B,) bool, where it has one."""
+    x, y = (outcome.estimate_m - outcome.target_m).T
+    cov = state.belief.cov
+    xx, xy, yy = cov[:, 0, 0], cov[:, 0, 2], cov[:, 2, 2]
+    determinant = xx * yy - xy * xy
+    regular = determinant > 1e-12 * xx * yy
+    squares = 0.5 * (yy * x * x - 2.0 * xy * x * y + xx * y * y)
+    return np.divide(squares, determinant, out=np.zeros(len(x)), where=regular), regular
 
 
 def change_lam(measured: Sequence[dict[str, Any]], lam: float) -> list[dict[str, Any]]:

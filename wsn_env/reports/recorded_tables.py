@@ -29,7 +29,7 @@ def recorded_rows(evaluation: RecordedEvaluation, lam: float) -> tuple[list[str]
                 f"{rms:.2f}",
                 f"{evaluation.spread(policy, lam, 'rms_m'):.2f}",
                 "" if reference is None else f"{rms / reference:.2f}",
-                f"{evaluation.mean(policy, lam, 'anees'):.2f}",
+                f"{evaluation.mean(policy, lam, 'variance_ratio'):.2f}",
                 f"{evaluation.mean(policy, lam, 'energy_mj'):.1f}",
                 f"{evaluation.mean(policy, lam, 'members'):.1f}",
                 *(f"{value:.2f}" for value in evaluation.values(policy, lam, "rms_m").mean(axis=1)),
