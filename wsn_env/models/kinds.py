@@ -167,10 +167,6 @@ class Registry:
         role: Any = self.role  # as in `constants_type`
         return _found(role, self._package)
 
-    def name_of(self, kind: type[Kind]) -> str:
-        """Of a shipped kind its name; of another its class's."""
-        return next((name for name, known in self.kinds.items() if known is kind), kind.__name__)
-
 
 @cache
 def _found(role: type[Kind], package: str) -> dict[str, type[Kind]]:
