@@ -23,14 +23,14 @@ def two_worlds(name, **changes):
     return world, one, other
 
 
-def delivered(state, outcome, row):
-    """What the head has received in a period: who reported what, and what each has left; whether all were asked."""
-    count = state.reports.count[row]
-    nodes = state.reports.node[row, :count]
+def delivered(scenario, state, outcome, row):
+    """What was received in a period: who reported what, and what each sender has left; whether all were asked."""
+    nodes = state.reports.node[row, : state.reports.count[row]]
+    senders = nodes[nodes != state.network.head[row]] if scenario.radio.receiver == "head" else nodes
     return (
         nodes.tolist(),
-        state.reports.value[row, :count].tolist(),
-        state.residual_j[row, nodes].tolist(),
+        state.reports.value[row, : len(nodes)].tolist(),
+        state.residual_j[row, senders].tolist(),
         bool(outcome.searched[row]),
     )
 
@@ -58,7 +58,7 @@ def test_what_is_not_delivered_cannot_be_seen(name, success):
         one, first = world.step(one, cluster)
         other, second = world.step(other, cluster)
         for row in np.flatnonzero(alike):
-            alike[row] = delivered(one, first, row) == delivered(other, second, row)
+            alike[row] = delivered(world.scenario, one, first, row) == delivered(world.scenario, other, second, row)
             if alike[row]:
                 assert differences(one, other, row) == []
                 hidden += not np.array_equal(one.residual_j[row], other.residual_j[row])

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import functools
 import os
+import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from types import FunctionType
@@ -27,6 +28,7 @@ from wsn_env.compiled import store
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+_opening = threading.RLock()
 SERIAL_ROWS = 8  # up to here one thread is faster than handing work out
 
 FAST = {"reassoc", "contract", "arcp", "nsz"}  # not nnan, ninf: infinities and NaN mean what they mean
@@ -105,17 +107,20 @@ class Kernel:
         if numba.config.DISABLE_JIT:
             self.call = np.errstate(over="ignore")(self.py_func)  # random bits wrap around
             return self.call(*arguments)
-        if self._place < 0:
-            self.call, result = store.open_kernel(self.py_func, self.targetoptions, arguments)
-            return result
-        kinds = arguments[self._place].dtype
-        known = next((made for made, other in list(self._made.values()) if other == kinds), None)
-        if known is not None:  # another object of a type that is known
-            self._made[id(kinds)] = known, kinds
-            return known(*arguments)
-        made, result = store.open_kernel(self.py_func, self.targetoptions, arguments, kinds)
-        self._made[id(kinds)] = made, kinds
-        return result
+        with _opening:  # one thread opens it, the others find it
+            if self._place < 0:
+                if self.call == self._first:
+                    self.call, result = store.open_kernel(self.py_func, self.targetoptions, arguments)
+                    return result
+                return self.call(*arguments)
+            kinds = arguments[self._place].dtype
+            known = next((made for made, other in self._made.values() if other == kinds), None)
+            if known is None:
+                made, result = store.open_kernel(self.py_func, self.targetoptions, arguments, kinds)
+                self._made[id(kinds)] = made, kinds
+                return result
+            self._made[id(kinds)] = known, kinds  # another object of a type that is known
+        return known(*arguments)
 
     def __reduce__(self) -> Any:
         if self.twin_of is not None:

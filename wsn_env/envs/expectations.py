@@ -71,7 +71,7 @@ class Expectations:
         self._constants, self._ring_m = constants(scenario), scenario.ring_m
         self._candidates, self._threads = candidates, threads
         self._expect = Pinned(_expect)
-        self._key = "expected", candidates, scenario.ring_m
+        self._scenario, self._key = scenario, ("expected", candidates, id(scenario))
         self._members = candidates  # for which there is room; more when more are met
 
     def of(self, view: View, depth: int) -> Expected:

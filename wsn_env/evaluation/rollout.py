@@ -67,7 +67,7 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
     Returns: the measured columns of each episode, and the sums that its return is made of. `anees` is the average
     normalised estimation error squared of the position (Bar-Shalom, Li & Kirubarajan, 2001, sec. 5.4), e' P^-1 e / 2:
     1 where the filter is honest, more where it is too sure. `variance_ratio` is the mean of e' e / trace(P), which one
-    thin direction of P cannot dominate.
+    thin direction of P cannot dominate. Both leave out the unscored periods, as `rms_m` does.
     """
     scenario = world.scenario
     names = "error", "square", "energy", "members", "handovers", "searches", "lost"
@@ -78,12 +78,12 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
     begin = None if bound is None else lambda state, _: bound.begin(state)
     for state, outcome in episodes(policy, world, seeds, begin):
         square, believed = outcome.error_m**2, outcome.posterior_rms_m**2
-        nees, regular = _position_nees(state, outcome)
-        nees_sums += nees
-        regular_periods += regular
         sums["error"] += outcome.error_m
         if state.period[0] > scenario.unscored:
             sums["square"] += square
+            nees, regular = _position_nees(state, outcome)
+            nees_sums += nees
+            regular_periods += regular
             counted_periods += believed > 0
             ratios += np.divide(square, believed, out=np.zeros(len(seeds)), where=believed > 0)
         sums["energy"] += outcome.energy_mj

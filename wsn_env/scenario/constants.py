@@ -39,30 +39,46 @@ TRACKING = record(
 
 def constants(scenario: Scenario) -> np.ndarray:
     """The record of a scenario, an array of one."""
-    known = _made.get(id(scenario))
-    if known is None or known[0]() is not scenario:
-        forget = partial(_made.pop, id(scenario), None)
-        _made[id(scenario)] = known = ref(scenario, lambda _: forget()), _constants(scenario)
-    return known[1].copy()
+    return _both(scenario)[0].copy()
 
 
 def common_constants(scenario: Scenario) -> np.ndarray:
     """The record, an array of one, of what matters beside the measurement: most scenarios' have one type."""
+    return _both(scenario)[1].copy()
+
+
+def _both(scenario):
+    known = _made.get(id(scenario))
+    if known is None or known[0]() is not scenario:
+        forget = partial(_made.pop, id(scenario), None)
+        records = _constants(scenario), _common_constants(scenario)
+        _made[id(scenario)] = known = ref(scenario, lambda _: forget()), records
+    return known[1]
+
+
+def _zeros(members):
+    """One record; those of equal types are of one type, by which kernels are found."""
+    made = record(members)
+    return np.zeros(1, _types.setdefault(made, made))
+
+
+def _common_constants(scenario):
     radio = constants_type(scenario.radio, scenario)
-    made = np.zeros(1, record([("radio", radio), ("radius_m", "f8"), ("equal_everywhere", "i8")]))
+    made = _zeros([("radio", radio), ("radius_m", "f8"), ("equal_everywhere", "i8")])
     fill_constants(made["radio"], scenario.radio, scenario)
     made["radius_m"], made["equal_everywhere"] = scenario.radius_m, scenario.measurement.equal_everywhere
     return made
 
 
-_made: dict[int, tuple[ref, np.ndarray]] = {}  # by scenario
+_made: dict[int, tuple[ref, tuple[np.ndarray, np.ndarray]]] = {}  # by scenario
+_types: dict[np.dtype, np.dtype] = {}
 
 
 def _constants(scenario: Scenario) -> np.ndarray:
     t = scenario.tracking
     types = [(name, constants_type(getattr(scenario, name), scenario)) for name in KINDS]
     plain = [(name, "f8") for name in ("period_s", "radius_m", "reach_m", "ring_m")]
-    made = np.zeros(1, record([*types, ("tracking", TRACKING), *plain]))
+    made = _zeros([*types, ("tracking", TRACKING), *plain])
     for name in KINDS:
         fill_constants(made[name], getattr(scenario, name), scenario)
     walks = t.velocity_s is not None

@@ -36,7 +36,7 @@ def spend(node: Any, joules: float, purpose: Any, episode: Episode) -> bool:
 
 @lean_piece
 def _charge(node, joules, purpose, episode):
-    """The same of what the network does not see."""
+    """Charge a node without telling the network."""
     state, b, out = episode
     residual_j, ledger = state.residual_j[b], state.ledger
     before = residual_j[node]
@@ -60,7 +60,7 @@ def note_spent(node: Any, joules: float, episode: Episode) -> None:
 
 @lean_piece
 def note_residual(node: Any, episode: Episode) -> None:
-    """A node has reported what it has left, or that it has nothing left shows: it does not answer."""
+    """The network learns what a node has left: from its report, or nothing, since it does not answer."""
     _note_battery(node, episode.state.residual_j[episode.b, node], episode)
 
 
@@ -107,12 +107,11 @@ def outside(mean: np.ndarray, r: Any) -> tuple[float, float]:
 def report(node: Any, head: Any, packets: float, purpose: Any, episode: Episode, r: Any) -> bool:
     """A node's report with its retries. Returns whether it was received; to the head its own is free.
 
-    Lost tries cost energy, too, but who sent them is not known: it would tell who has detected the target.
+    Lost tries cost energy, too, but who sent them is not known: it would tell who has detected the target. Beyond one
+    hop nothing is sent: after a search the new head may lie so far, for a modem.
 
     Args:
         packets: how many it is long.
-
-    Beyond one hop nothing is sent: after a search the new head may lie so far, for a modem.
     """
     state, b = episode.state, episode.b
     positions, residual_j = state.network.positions[b], state.residual_j[b]
@@ -121,7 +120,6 @@ def report(node: Any, head: Any, packets: float, purpose: Any, episode: Episode,
         if residual_j[head] <= 0.0:
             return False
         if node == head:
-            note_residual(head, episode)
             return True
     else:
         x, y = outside(state.belief.row[b].predicted_mean, r)
@@ -139,7 +137,7 @@ def report(node: Any, head: Any, packets: float, purpose: Any, episode: Episode,
         if draws.uniform(stream, 16 * node + attempt) < r.packet_success:
             note_residual(node, episode)  # what arrives also says what its sender has left, and how often it was tried
             if r.to_head:
-                for _ in range(attempt + 1):
+                for _ in range(attempt + 1):  # one by one, as they were charged: with the same rounding
                     note_spent(head, reception(r, bits), episode)
             return True
     return False

@@ -120,6 +120,8 @@ def _sense_and_report(head, chosen, episode, c):
             node = head if k == place else members[k - (k > place)]
             if wake(node, messages.SENSING, episode, c.radio):
                 sense(node, head, messages.REPORT, target, episode, c)
+    if head >= 0 and state.residual_j[b, head] <= 0.0:
+        messages.note_residual(head, episode)
     if c.radio.asleep_j > 0.0:
         _sleep(episode, c.radio)
     _remember_miss(state, b, c)
@@ -143,7 +145,9 @@ def _take_choice(head, chosen, episode, r):
     for node in chosen:
         asked_for += node != -1
         if 0 <= node < len(residual_j) and residual_j[node] <= 0.0:
-            messages.note_residual(node, episode)  # it does not answer
+            messages.note_residual(np.int64(node), episode)  # it does not answer
+    if 0 <= head < len(residual_j) and residual_j[head] <= 0.0:
+        messages.note_residual(np.int64(head), episode)
     if head < 0 or head >= len(residual_j) or residual_j[head] <= 0.0:
         out.dropped += head != KEEP_HEAD and head != KEEP_CLUSTER
         head = standing.head if stands else nearest_living(network.positions[b], residual_j, predicted[0], predicted[2])
@@ -197,15 +201,15 @@ def wake(node: Any, purpose: Any, episode: Episode, r: Any) -> bool:
 
 @lean_piece
 def _sleep(episode, r):
-    """All living nodes outside the cluster pay for the period, too."""
+    """All nodes outside the cluster that are taken for alive pay for the period, too."""
     state, b = episode.state, episode.b
     network, standing = state.network, state.network.row[b]
-    residual_j, members, j = state.residual_j[b], network.members[b], 0
-    for node in range(len(residual_j)):
+    battery, members, j = network.battery[b], network.members[b], 0
+    for node in range(len(battery)):
         while j < standing.n_members and members[j] < node:
             j += 1
         awake = node == standing.head or (j < standing.n_members and members[j] == node)
-        if not awake and residual_j[node] > 0.0:
+        if not awake and battery[node] > 0.0:
             messages.spend(node, r.asleep_j, messages.SENSING, episode)
 
 
@@ -324,7 +328,7 @@ def _remove_dead_nodes(episode, r):
     living = 0
     for k in range(standing.n_members):
         if residual_j[members[k]] <= 0.0:
-            messages.note_residual(members[k], episode)
+            messages.note_residual(np.int64(members[k]), episode)
         else:
             if standing.head < 0:
                 standing.head = members[k]

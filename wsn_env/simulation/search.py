@@ -34,14 +34,20 @@ def search(
         strongest = _wake_all(episode, c)
         if strongest >= 0:
             # The new head takes over (the velocity is handed to it) and hears the others.
-            if messages.take_over(strongest, episode, c.radio):
+            if c.radio.to_head and messages.take_over(strongest, episode, c.radio):
                 out.handover = True
             out.detections = 0
+            before = state.reports.count[b]
             state.reports.count[b] = 0
+            state.reports.bitmap[b] = 0  # all are asked, and silence means 0
             target = target_of(state, b)
             for node in range(state.network.battery.shape[1]):
                 sense(node, strongest, messages.SEARCH, target, episode, c)
             found[b] = _restart_at_centroid(state, b, c)
+            if not found[b]:  # nothing has come: all is as it was
+                state.reports.count[b] = before
+            elif not c.radio.to_head:
+                messages.take_over(_strongest_heard(episode, c), episode, c.radio)
         else:  # asked, all keep silent
             state.sensed[b] = 0
             state.reports.bitmap[b] = 0
@@ -65,7 +71,8 @@ def _wake_all(episode, c):
         while j < standing.n_members and members[j] < node:
             j += 1
         awake = node == standing.head or (j < standing.n_members and members[j] == node)
-        if residual_j[node] <= 0.0 or not messages.spend(node, call, messages.SEARCH, episode):
+        living = residual_j[node] > 0.0
+        if network.battery[b, node] <= 0.0 or not messages.spend(node, call, messages.SEARCH, episode) or not living:
             continue
         if not awake and not wake(node, messages.SEARCH, episode, c.radio):
             continue
@@ -75,6 +82,20 @@ def _wake_all(episode, c):
             strength = signal(c.measurement, occasion, sensor, target[0], target[1])
             if strength > best:
                 strongest, best = node, strength
+    return strongest
+
+
+@lean_piece
+def _strongest_heard(episode, c):
+    """Of those that a sink has heard the one with the strongest signal, the first by number where signals are alike."""
+    state, b = episode.state, episode.b
+    occasion, target = Occasion(state.key[b], state.row[b].period, True), target_of(state, b)
+    strongest, best = np.int64(-1), -np.inf
+    for k in range(state.reports.count[b]):
+        node: Any = np.int64(state.reports.node[b, k])
+        strength = signal(c.measurement, occasion, node_at(state.network.positions[b], node), target[0], target[1])
+        if strength > best:
+            strongest, best = node, strength
     return strongest
 
 
