@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,6 +58,10 @@ class Greedy(ViewPolicy):
             check_quantity("Terms", "service", each.service, above=0)
         object.__setattr__(self, "terms", terms)
 
+    @cached_property
+    def _expectations(self) -> Expectations:
+        return Expectations(self.scenario, CANDIDATES + 1)
+
     def act(self, view: View) -> Cluster:
         """Bargain, for every row."""
         table = np.array(self.terms)
@@ -64,7 +69,7 @@ class Greedy(ViewPolicy):
         nodes = np.column_stack([view.nearest(CANDIDATES, self.scenario.ring_m)[0], view.nearest_living()])
         heads, members = np.empty(len(nodes), np.int64), np.empty((len(nodes), CANDIDATES), np.int32)
         prices = view.lam / terms[:, 1], 1.0 / terms[:, 2]
-        table = Expectations(self.scenario, CANDIDATES + 1).of_nodes(view, nodes, REPORTS).table
+        table = self._expectations.of_nodes(view, nodes, REPORTS).table
         known = common_constants(self.scenario), view.knowledge.handle
         _bargain(0, len(nodes), *known, table, prices, (heads, members))
         return Cluster(heads, members)

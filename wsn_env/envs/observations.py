@@ -150,7 +150,7 @@ class CandidatesObservation:
 
 
 class MenuObservation(CandidatesObservation):
-    """Flat Box float32: BELIEF_FEATURES, then ENTRY_FEATURES of each entry of the menu: what it promises."""
+    """Flat Box float32: BELIEF_FEATURES, then ENTRY_FEATURES of each entry of the menu: its predicted outcome."""
 
     features: tuple[str, ...] = ENTRY_FEATURES
     depth, kernel = REPORTS_AHEAD, _encode_menu

@@ -1,4 +1,4 @@
-"""What each entry of the menu promises: the belief, the energy and the cluster that a choice would leave."""
+"""The predicted outcome of each entry of the menu: the belief, the energy and the cluster that a choice would leave."""
 
 from typing import Any, NamedTuple
 

@@ -48,7 +48,7 @@ def inherit(u: float, weights: np.ndarray, total: float, ended: Any, recent: np.
 
     Ends ascend, so of the particles that end at one place the last to be written stays. What is left is a running
     maximum: over 4 slots, over 16, and over all in strides of 16, in vectors (one number after the other it would be a
-    branch that nobody can foretell). Sums restart with every block, so that blocks need not wait for each other.
+    branch that nobody can predict). Sums restart with every block, so that blocks need not wait for each other.
 
     Args:
         ended, recent: (P + 16,) scratch; 0 or one more than the last particle that ends there, from 3 and 12 on.
