@@ -9,14 +9,14 @@ Markers are `<!-- begin NAME -->` and `<!-- end NAME -->`: `machine`, `targets`,
 from __future__ import annotations
 
 import argparse
-import re
 import textwrap
 from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.plots import draw
-from benchmarks.race import Claim, Plot, Result, Table
+from benchmarks.race import Claim, Plot, Result
 from wsn_env.evaluation.files import replacing
+from wsn_env.reports.markdown import block_names, fill_blocks, markdown_table
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "performance.md"
@@ -28,7 +28,6 @@ ORDER = (
 EVERY_IMPLEMENTATION = ("particles", "rows")  # plots that stand together, at the end
 ENVIRONMENTS = "env_rows"  # joins the second of them
 WIDTH = 128
-MARKED = re.compile(r"(<!-- begin (\w+) -->\n).*?(<!-- end \2 -->)", flags=re.DOTALL)
 
 
 def renew_page(folder: Path = RESULTS, page: Path = PAGE) -> None:
@@ -38,7 +37,7 @@ def renew_page(folder: Path = RESULTS, page: Path = PAGE) -> None:
         raise SystemExit(f"no results in {folder}: run python -m benchmarks")
     for plot in make_plots(results).values():
         draw(plot, page.with_name(f"performance_{plot.name}.svg"))
-    text = fill_blocks(page.read_text(), results)
+    text = renew_blocks(page.read_text(), results)
     with replacing(page) as temporary:
         temporary.write_text(text)
 
@@ -57,9 +56,9 @@ def make_plots(results: list[Result]) -> dict[str, Plot]:
     return found
 
 
-def fill_blocks(text: str, results: list[Result]) -> str:
+def renew_blocks(text: str, results: list[Result]) -> str:
     """The page's text with new blocks. Doing it twice changes nothing."""
-    own = {name for _, name, _ in MARKED.findall(text)}
+    own = set(block_names(text))
     blocks = {"machine": machine(results), "targets": table_of_targets(results)}
     blocks |= {result.name: section(result, heading=False) for result in results}
     drawn = make_plots(results)
@@ -67,7 +66,7 @@ def fill_blocks(text: str, results: list[Result]) -> str:
     blocks["further"] = "\n".join(section(result) for result in results if result.name not in own)
     if "further" not in own and blocks["further"]:
         raise SystemExit(f"{PAGE.name} has no place for further claims: add <!-- begin further --> and its end")
-    return MARKED.sub(lambda found: found[1] + blocks.get(found[2], "") + found[3], text)
+    return fill_blocks(text, dict.fromkeys(own, "") | blocks)
 
 
 def machine(results: list[Result]) -> str:
@@ -102,10 +101,8 @@ def table_of_targets(results: list[Result]) -> str:
     for result in results:
         for claim in result.claims:
             lines.setdefault((claim.what, claim.target), []).append(claim)
-    return markdown(
-        Table("", ["claim", "target", "measured", "worst case", "verdict"], [_line(each) for each in lines.values()]),
-        left=(0, 3, 4),
-    )
+    columns = ("claim", "target", "measured", "worst case", "verdict")
+    return markdown_table(columns, [_line(each) for each in lines.values()], left=(0, 3, 4))
 
 
 def _line(claims: list[Claim]) -> list[str]:
@@ -128,7 +125,7 @@ def section(result: Result, heading: bool = True) -> str:
     """Text, tables, what was skipped, plots."""
     parts = [f"## {result.title}\n"] if heading else []
     parts += [_wrap_text(result.text)] if result.text else []
-    parts += [f"{table.title}:\n\n{markdown(table)}" for table in result.tables]
+    parts += [f"{table.title}:\n\n{markdown_table(table.columns, table.rows)}" for table in result.tables]
     if result.skipped:
         names = "; ".join(f"{name} ({reason})" for name, reason in result.skipped.items())
         parts.append(_wrap_text(f"Skipped: {names}."))
@@ -143,13 +140,6 @@ def _image(plot: Plot) -> str:
 
 def _wrap_text(text: str) -> str:
     return textwrap.fill(text, WIDTH, break_on_hyphens=False) + "\n"
-
-
-def markdown(table: Table, left: tuple[int, ...] = (0,)) -> str:
-    """These columns to the left, the others to the right."""
-    rules = ["---" if i in left else "--:" for i in range(len(table.columns))]
-    lines = [table.columns, rules, *table.rows]
-    return "".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |\n" for line in lines)
 
 
 def main() -> None:

@@ -18,6 +18,8 @@ from typing import Annotated
 
 import tyro
 
+from wsn_env.reports.markdown import fill_blocks, markdown_table
+
 HERE = Path(__file__).parent
 ROOT = HERE.parent
 PAGE = ROOT / "docs" / "toolkits.md"
@@ -70,7 +72,7 @@ def main() -> int:
     return bool(failed)
 
 
-def run(script: Path, settings: Settings) -> str:
+def run(script: Path, settings: Settings) -> list[str]:
     """One example: its row of the table. Prints its closing line."""
     python = environment(script, settings)
     command = [python, script, "--steps", str(settings.steps)]
@@ -83,7 +85,7 @@ def run(script: Path, settings: Settings) -> str:
     ask = f"from importlib.metadata import version; print(version({toolkit!r}))"
     version = subprocess.run([python, "-c", ask], check=True, capture_output=True, text=True).stdout.strip()
     cells = f"[{script.name}](../examples/{script.name})", f"{toolkit} {version}", found["speed"], found["trained"]
-    return f"| {' | '.join(cells)} |"
+    return list(cells)
 
 
 def environment(script: Path, settings: Settings) -> Path:
@@ -106,12 +108,10 @@ def environment(script: Path, settings: Settings) -> Path:
     return python
 
 
-def renew(rows: list[str]) -> None:
+def renew(rows: list[list[str]]) -> None:
     """Put the measured table into its page."""
-    before, rest = PAGE.read_text().split("<!-- measured -->\n")
-    _, after = rest.split("<!-- end -->\n")
-    head = "| example | toolkit | periods a second | return |\n|---|---|--:|--:|\n"
-    PAGE.write_text(before + "<!-- measured -->\n" + head + "\n".join(rows) + "\n<!-- end -->\n" + after)
+    table = markdown_table(("example", "toolkit", "periods a second", "return"), rows, left=(0, 1))
+    PAGE.write_text(fill_blocks(PAGE.read_text(), {"examples": table}))
     print(f"written: {PAGE}")
 
 

@@ -13,6 +13,7 @@ from scipy import stats
 
 from wsn_env.envs.rendering.colours import LINES
 from wsn_env.evaluation.files import replacing
+from wsn_env.reports.markdown import markdown_table
 
 CURVE = "time/total_timesteps", "rollout/ep_rew_mean", "rollout/ep_len_mean"
 WORSE = 1.35  # the picture's lowest reward over its highest
@@ -29,7 +30,7 @@ def over_seeds(values) -> tuple[float, float]:
 
 def table(lams, results: dict[str, list[Returns]], usual: str) -> str:
     """Markdown: mean return at each lam, with the difference from the usual variant in percent, over trainings."""
-    lines = ["| variant | " + " | ".join(f"lam = {lam:g}" for lam in lams) + " |", "|---" + "|--:" * len(lams) + "|"]
+    rows = []
     for name, runs in results.items():
         cells = []
         for lam in lams:
@@ -43,8 +44,8 @@ def table(lams, results: dict[str, list[Returns]], usual: str) -> str:
             if name != usual and np.isfinite(reference):
                 cell += f" ({100 * (mean - reference) / abs(reference):+.1f} %)"
             cells.append(cell)
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    return "\n".join(lines) + "\n"
+        rows.append([name, *cells])
+    return markdown_table(["variant", *(f"lam = {lam:g}" for lam in lams)], rows)
 
 
 def save_table(out: Path, scenario, lams, results: dict[str, list[Returns]], usual: str) -> None:

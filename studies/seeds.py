@@ -24,6 +24,7 @@ from wsn_env.evaluation.intervals import Summary
 from wsn_env.evaluation.kept_blocks import remove_kept_blocks
 from wsn_env.evaluation.policies import make_policy, policy_names
 from wsn_env.evaluation.progress import progress_bar
+from wsn_env.reports.markdown import markdown_table
 from wsn_env.scenario import Scenario
 
 SLOW = ("ppo", "planner", "all")
@@ -110,13 +111,12 @@ def format_advantage(evaluation: Evaluation, trained: list[str], rule: str, lam:
 def table(evaluation: Evaluation, trained: list[str]) -> str:
     """Returns at each lam; for each rule, or the best of its family, what PPO has over it, in percent of it."""
     lams = evaluation.lams
-    lines = ["| policy | " + " | ".join(f"{lam:g}" for lam in lams) + " |", "|---" + "|--:" * len(lams) + "|"]
     cells = []
     for lam in lams:
         own = returns(evaluation, trained, lam)
         over_seeds = own.mean(axis=1)
         cells.append(f"**{own.mean():.1f}** ({over_seeds.min():.1f} to {over_seeds.max():.1f})")
-    lines.append("| **PPO**, one policy | " + " | ".join(cells) + " |")
+    rows = [["**PPO**, one policy", *cells]]
     for stem, names in families(evaluation, trained).items():
         cells = []
         for lam in lams:
@@ -125,8 +125,8 @@ def table(evaluation: Evaluation, trained: list[str]) -> str:
             which = f"{split_number(best)[1]}: " if len(names) > 1 else ""
             cells.append(f"{which}{theirs:.1f} ({format_advantage(evaluation, trained, best, lam)})")
         label = f"best of {stem}0..{split_number(names[-1])[1]}" if len(names) > 1 else stem
-        lines.append(f"| {label} | " + " | ".join(cells) + " |")
-    return "\n".join(lines) + "\n"
+        rows.append([label, *cells])
+    return markdown_table(["policy", *(f"{lam:g}" for lam in lams)], rows)
 
 
 def list_bounds(evaluation: Evaluation, trained: list[str]) -> str:

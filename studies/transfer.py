@@ -21,6 +21,7 @@ from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.kept_blocks import remove_kept_blocks
 from wsn_env.evaluation.policies import make_policy
 from wsn_env.evaluation.progress import progress_bar
+from wsn_env.reports.markdown import markdown_table
 from wsn_env.scenario import Scenario
 
 SIZES = [f"nearest{size}" for size in range(9)]
@@ -53,7 +54,7 @@ def main() -> int:
     worlds = {text: text for text in asked.worlds} or worlds_of(usual)
     scenarios = {what: make_scenario(asked.scenario, text.split(), []) for what, text in worlds.items()}
     lams = asked.lam or usual.lam_octaves
-    lines = ["| world | " + " | ".join(f"{lam:g}" for lam in lams) + " |", "|---" + "|--:" * len(lams) + "|"]
+    rows = []
     for i, (what, scenario) in enumerate(scenarios.items(), 1):
         trained = load_trained(asked.policies, scenario)
         policies = trained | {name: make_policy(name, scenario) for name in SIZES}
@@ -62,8 +63,8 @@ def main() -> int:
         with progress_bar() as report:
             evaluation = evaluate(policies, scenario, lams, asked.episodes, asked.seed, keep=keep, progress=report)
         evaluation.save(keep)
-        lines.append(f"| {what} | " + " | ".join(format_cells(evaluation, list(trained))) + " |")
-    text = "\n".join(lines) + "\n"
+        rows.append([what, *format_cells(evaluation, list(trained))])
+    text = markdown_table(["world", *(f"{lam:g}" for lam in lams)], rows)
     with replacing(asked.out / f"{usual.name}.md") as path:
         path.write_text(text)
     for settings in worlds.values():

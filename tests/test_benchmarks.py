@@ -21,6 +21,7 @@ from benchmarks.filters import (
 )
 from benchmarks.filters.exact import estimates
 from benchmarks.filters.textbook import ParticleFilter
+from wsn_env.reports.markdown import block_names
 
 MEASUREMENTS = ("position", "rssi")
 NAMES = [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW_STARTERS)) for name in IMPLEMENTATIONS]
@@ -192,7 +193,7 @@ def test_claims_that_differ_in_their_case_are_one_line_with_the_worst():
 
 
 def test_the_page_has_a_place_for_every_claim():
-    places = {name for _, name, _ in page.MARKED.findall(page.PAGE.read_text())}
+    places = set(block_names(page.PAGE.read_text()))
     assert {*suite.CLAIMS, "machine", "targets", "plots", "further"} == places
     assert max(map(len, page.PAGE.read_text().splitlines())) <= 140
 
@@ -210,7 +211,7 @@ def test_a_claim_without_a_place_of_its_own_stands_under_further():
     text = "# Title\n<!-- begin further -->\nold\n<!-- end further -->\nprose\n"
     facts = {"processor": "a", "cores": 2, "l2_bytes": 2**20, "python": "3", "system": "b", "packages": {}}
     table = race.Table("Cost", ["nodes", "us"], [["225", "3"]])
-    new = page.fill_blocks(text, [race.Result("nodes", "Nodes", tables=[table], machine=facts)])
+    new = page.renew_blocks(text, [race.Result("nodes", "Nodes", tables=[table], machine=facts)])
     assert "old" not in new and new.endswith("prose\n")
     assert "## Nodes\n\nCost:\n\n| nodes | us |\n| --- | --: |\n| 225 | 3 |\n" in new
 

@@ -6,12 +6,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from tests.figures import check_tables
 from wsn_env.papers import reproduce
 from wsn_env.papers.claim import HOLDS, NOT_REPRODUCED, UNDER_READING, Expectation, judge_claim, print_expected
 from wsn_env.papers.pre_dc.claims import EXPECTED_RMS_M, PAPER_RMS_M, exceeds
 from wsn_env.papers.pre_dc.systems import NODES, SYSTEMS, motion_trial, scenario_as_read
 from wsn_env.papers.rollout import Trial, play, play_all, standard_error
-from wsn_env.papers.sheet import print_table
+from wsn_env.papers.sheet import show_table
 
 FIGURES = ("fig1", "fig3", "fig4", "fig5", "fig6", "fig7", "fig8")
 COLUMNS = {
@@ -73,9 +74,13 @@ def test_every_table_is_written(short, name):
     assert "nan" not in text and "inf" not in text.replace("information", "")
 
 
+def test_the_page_shows_what_is_written(short):
+    check_tables("reproduction/pre_dc.md", "reproduce/pre_dc", short[0], share=2 / 100)
+
+
 def test_nothing_else_is_left_behind(short):
     expected = {f"{name}.csv" for name in COLUMNS} | {f"{name}.png" for name in FIGURES}
-    assert {path.name for path in short[0].iterdir()} == expected
+    assert {path.name for path in short[0].iterdir() if path.suffix != ".md"} == expected
 
 
 @pytest.mark.parametrize("name", FIGURES)
@@ -148,8 +153,8 @@ def test_an_expectation_knows_its_tolerance():
     assert Expectation("p", 1.0, 0.1, 1.09).within and not Expectation("p", 1.0, 0.1, 0.89).within
 
 
-def test_units_survive_the_terminal(capsys):
-    print_table("Table 2", ("policy", "RMS [m]"), [("a", "1")], "mean [m]")
+def test_units_survive_the_terminal(tmp_path, capsys):
+    show_table(tmp_path / "table2.md", "Table 2", ("policy", "RMS [m]"), [("a", "1")], "mean [m]")
     print_expected([Expectation("RMS [m] of a", 1.0, 0.1, 2.0)])
     assert capsys.readouterr().out.count("[m]") == 3
 

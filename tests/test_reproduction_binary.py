@@ -5,6 +5,7 @@ import csv
 import numpy as np
 import pytest
 
+from tests.figures import check_tables
 from wsn_env.papers import reproduce
 from wsn_env.papers.binary.claims import DEFAULTS, SHIFT_BIAS_M, Study
 from wsn_env.papers.binary.readings import PAIRS, boundary_nodes, detecting_nodes, even_period_s, lens_m2
@@ -120,9 +121,13 @@ def test_misread_bits_ruin_least_squares_and_not_the_particle_filter():
 # --- the files ----------------------------------------------------------------------------------------------
 
 
+def test_the_page_shows_what_is_written(short):
+    check_tables("reproduction/binary.md", "reproduce/binary", short, share=2 / 100)
+
+
 def test_every_file_is_written(short):
     expected = {f"{name}.csv" for name in TABLES} | {f"{name}.png" for name in PICTURES}
-    assert {path.name for path in short.iterdir()} == expected
+    assert {path.name for path in short.iterdir() if path.suffix != ".md"} == expected
     for name in PICTURES:
         assert (short / f"{name}.png").read_bytes().startswith(b"\x89PNG")
     for name in TABLES:

@@ -5,6 +5,7 @@ import csv
 import numpy as np
 import pytest
 
+from tests.figures import check_tables
 from wsn_env.papers import reproduce
 from wsn_env.papers.claim import HOLDS, NOT_REPRODUCED, UNDER_READING
 from wsn_env.papers.rollout import exceeds, play
@@ -104,9 +105,13 @@ def test_every_table_is_written(short, name):
     assert "nan" not in text and "inf" not in text.replace("information", "")
 
 
+def test_the_page_shows_what_is_written(short):
+    check_tables("reproduction/underwater.md", "reproduce/underwater", short, share=2 / 100)
+
+
 def test_nothing_else_is_left_behind_and_pictures_are_pngs(short):
     expected = {f"{name}.csv" for name in COLUMNS} | {f"{name}.png" for name in PICTURES}
-    assert {path.name for path in short.iterdir()} == expected
+    assert {path.name for path in short.iterdir() if path.suffix != ".md"} == expected
     assert all((short / f"{name}.png").read_bytes().startswith(b"\x89PNG") for name in PICTURES)
 
 

@@ -10,7 +10,9 @@ from typing import Literal
 from rich.markup import escape
 from rich.table import Table
 
+from wsn_env.evaluation.files import replacing
 from wsn_env.papers.sheet import Sheet, write_sheet
+from wsn_env.reports.markdown import markdown_table
 from wsn_env.reports.tables import wide_console
 
 Verdict = Literal["holds", "holds under a stated reading", "not reproduced"]
@@ -57,18 +59,35 @@ def judge_claim(plainly: bool, under_reading: bool) -> Verdict:
 
 
 def write_and_print_claims(out: Path, claims: Sequence[Claim], expected: Sequence[Expectation]) -> None:
-    """Write claims.csv and expected.csv to the folder and print both, after all else."""
+    """Write claims.csv, expected.csv and summary.md to the folder and print the first two, after all else."""
     write_claims(out / "claims.csv", claims)
     write_expected(out / "expected.csv", expected)
+    write_summary(out / "summary.md", claims, expected)
     print_claims(claims)
     print_expected(expected)
     print(f"written: {out}")
 
 
 def write_claims(path: Path, claims: Iterable[Claim]) -> None:
-    """claims.csv: claim, paper, ours, verdict."""
-    rows = [(c.claim, c.paper, c.ours, c.verdict) for c in claims]
-    write_sheet(path, Sheet(("claim", "paper", "ours", "verdict"), rows))
+    """claims.csv and claims.md: claim, paper, ours, verdict."""
+    columns, rows = ("claim", "paper", "ours", "verdict"), [(c.claim, c.paper, c.ours, c.verdict) for c in claims]
+    write_sheet(path, Sheet(columns, rows))
+    with replacing(path.with_suffix(".md")) as temporary:
+        temporary.write_text(markdown_table(columns, rows, left=(0, 1, 2, 3)), encoding="utf-8")
+
+
+def write_summary(path: Path, claims: Sequence[Claim], expected: Sequence[Expectation]) -> None:
+    """How many expected figures are met and how many claims have which verdict, as a line of Markdown."""
+    met = sum(e.within for e in expected)
+    verdicts = ", ".join(f"{sum(c.verdict == verdict for c in claims)} {verdict}" for verdict in COLOURS)
+    line = f"Of {len(expected)} expected figures {met} are met. Of {len(claims)} claims: {verdicts}.\n"
+    missed = "".join(
+        f"- missed: {e.quantity}: {e.measured:.4g}, expected {e.expected:.4g} ± {e.tolerance:.2g}\n"
+        for e in expected
+        if not e.within
+    )
+    with replacing(path) as temporary:
+        temporary.write_text(line + (f"\n{missed}" if missed else ""), encoding="utf-8")
 
 
 def write_expected(path: Path, expected: Iterable[Expectation]) -> None:

@@ -16,6 +16,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from wsn_env.evaluation.files import replacing
+from wsn_env.reports.markdown import markdown_table
 from wsn_env.reports.pictures import NEEDED, can_draw
 from wsn_env.reports.tables import wide_console
 
@@ -84,8 +85,13 @@ def _cell(value: Any) -> str:
     return "" if value is None or value != value else f"{value:.6g}"
 
 
-def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], caption: str | None = None) -> None:
-    """A table on the terminal: the first column names, the others are figures."""
+def show_table(
+    path: Path, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], caption: str | None = None
+) -> None:
+    """A table on the terminal, and as Markdown in a file: the first column names, the others are figures."""
+    rows = list(rows)
+    with replacing(path) as temporary:
+        temporary.write_text(markdown_table(columns, rows) + (f"\n{caption}\n" if caption else ""), encoding="utf-8")
     table = Table(title=escape(title), caption=escape(caption or ""), title_justify="left", caption_justify="left")
     for i, column in enumerate(columns):
         table.add_column(escape(column), justify="right" if i else "left")
@@ -94,7 +100,12 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
     wide_console().print(table)
 
 
-def print_sheet(title: str, sheet: Sheet, caption: str | None = None) -> None:
-    """A sheet on the terminal, numbers with four digits."""
-    rows = [["-" if v is None else f"{v:.4g}" if isinstance(v, float) else str(v) for v in row] for row in sheet.rows]
-    print_table(title, sheet.columns, rows, caption)
+def show_sheet(path: Path, title: str, sheet: Sheet, caption: str | None = None) -> None:
+    """The same of a sheet, numbers with four digits; a column `stderr_...` in brackets behind the one before it."""
+    shown = [i for i, name in enumerate(sheet.columns) if not name.startswith("stderr")]
+    rows = []
+    for row in sheet.rows:
+        cells = ["-" if v is None else f"{v:.4g}" if isinstance(v, float) else str(v) for v in row]
+        errors = (f" ({cells[i + 1]})" if i + 1 < len(row) and i + 1 not in shown else "" for i in shown)
+        rows.append([cells[i] + error for i, error in zip(shown, errors, strict=True)])
+    show_table(path, title, [sheet.columns[i] for i in shown], rows, caption)

@@ -7,6 +7,7 @@ from pathlib import Path
 from wsn_env.bluetooth.recorded_evaluation import RecordedEvaluation
 from wsn_env.evaluation.comparison import stem_of
 from wsn_env.evaluation.files import replacing
+from wsn_env.reports.markdown import markdown_table
 from wsn_env.reports.pictures import can_draw, write_picture
 from wsn_env.reports.recorded_plots import draw_recorded
 from wsn_env.reports.tables import wide_console
@@ -76,10 +77,9 @@ def recorded_markdown(evaluation: RecordedEvaluation) -> str:
     parts = []
     for lam in evaluation.first.lams:
         header, rows = recorded_rows(evaluation, lam)
-        lines = [f"## {evaluation.description}, lam = {lam:g} m/mJ", ""]
-        lines += ["| " + " | ".join(header) + " |", "|---" + "|--:" * (len(header) - 1) + "|"]
-        lines += ["| " + " | ".join(row) + " |" for row in rows]
-        parts.append("\n".join([*lines, "", *(f"- {line}" for line in compare_at_equal_energy(evaluation, lam))]))
+        title = f"## {evaluation.description}, lam = {lam:g} m/mJ\n"
+        comparisons = (f"- {line}" for line in compare_at_equal_energy(evaluation, lam))
+        parts.append("\n".join([title, markdown_table(header, rows), *comparisons]))
     return "\n\n".join(parts) + "\n"
 
 

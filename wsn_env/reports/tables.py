@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from wsn_env.evaluation.comparison import Evaluation
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.intervals import Summary
+from wsn_env.reports.markdown import markdown_table
 from wsn_env.simulation.bound import bound_kind
 
 if TYPE_CHECKING:
@@ -103,9 +104,7 @@ def print_tables(evaluation: Evaluation, reference: str | None = None, console: 
 
 def format_markdown(evaluation: Evaluation, lam: float, reference: str) -> str:
     """The same as Markdown."""
-    header = table_header(evaluation, reference)
-    lines = ["| " + " | ".join(header) + " |", "|---" + "|--:" * (len(header) - 1) + "|"]
-    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in table_rows(evaluation, lam, reference)]) + "\n"
+    return markdown_table(table_header(evaluation, reference), table_rows(evaluation, lam, reference))
 
 
 def save_markdown(evaluation: Evaluation, folder: str | Path) -> None:

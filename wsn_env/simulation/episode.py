@@ -116,7 +116,7 @@ class Tracks:
         self._motion = np.zeros(1, constants_type(motion, scenario))
         fill_constants(self._motion, motion, scenario)
         side_m, depth_m = scenario.field.room_m
-        self._course = scenario.period_s, side_m, depth_m, motion.recorded_tracks(scenario)
+        self._course = scenario.period_s, side_m, depth_m, motion.recorded_tracks(scenario), motion.bounded
 
     def draw(self, rows: np.ndarray, keys: np.ndarray, tracks: np.ndarray, threads: int) -> None:
         """Fill tracks (B, periods + 1, 4) in the rows marked."""
@@ -130,15 +130,16 @@ def _draw_tracks(start, stop, cs, course, rows, keys, tracks):
     Args:
         course: the fields of a Course.
     """
-    period_s, side_m, depth_m, recorded = course
+    period_s, side_m, depth_m, recorded, bounded = course
     for b in range(start, stop):
         if rows[b]:
             track = tracks[b]
             stream = draws.stream(keys[b], 0, draws.TRACK)
-            draw(cs[0], stream, Course(period_s, side_m, depth_m, recorded), track)
-            for state in track:
-                reflect(state, 0, side_m)
-                reflect(state, 2, depth_m)
+            draw(cs[0], stream, Course(period_s, side_m, depth_m, recorded, bounded), track)
+            if bounded:
+                for state in track:
+                    reflect(state, 0, side_m)
+                    reflect(state, 2, depth_m)
 
 
 @piece

@@ -24,6 +24,7 @@ class Course(NamedTuple):
     side_m: float  # extent of the field along x
     depth_m: float  # along y
     recorded: np.ndarray  # (N, periods + 1, 4): the motion's `recorded_tracks`
+    bounded: bool  # the motion's
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,8 @@ class Motion(Kind):
 
         draw(m, stream, course, track)
             Fill `track` (periods + 1, 4) with the true states (x, vx, y, vy) [m, m/s]. Random numbers are draws of
-            `stream` by their numbers; `m` holds the motion's constants. What leaves the field is reflected after it.
+            `stream` by their numbers; `m` holds the motion's constants. What leaves the field is reflected after it,
+            unless the kind says `bounded = False`.
     """
 
     abstract: ClassVar[bool] = True
@@ -43,10 +45,16 @@ class Motion(Kind):
     optional: ClassVar[tuple[str, ...]] = ()
 
     fitting_q: ClassVar[float]
+    bounded: ClassVar[bool] = True  # False: a track may leave the field
 
     @property
     def process_noise_ms2(self) -> float | None:
         """sd of the track's own white acceleration; None: it has none, and turns as it likes."""
+        return None
+
+    @property
+    def start_sds(self) -> tuple[float, float] | None:
+        """sds of a normal start about the field's middle and of its velocity [m, m/s]; None: it is another."""
         return None
 
     def check(self, scenario: Scenario) -> None:

@@ -31,9 +31,11 @@ from pathlib import Path
 from wsn_env.evaluation.progress import Progress, progress_bar
 from wsn_env.papers.binary import figures
 from wsn_env.papers.binary.claims import Study, judge_claims, list_expectations
+from wsn_env.papers.binary.coverage import COVERAGE
 from wsn_env.papers.binary.systems import play_paper
 from wsn_env.papers.claim import write_and_print_claims
-from wsn_env.papers.sheet import prepare_folder, print_sheet
+from wsn_env.papers.coverage import write_coverage
+from wsn_env.papers.sheet import prepare_folder, show_sheet
 
 
 def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
@@ -44,8 +46,10 @@ def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
     study = Study(results)
     claims, expectations = judge_claims(study), list_expectations(study)
     figures.write_figures(out, study)
-    print_sheet("Systems", figures.systems(results), f"{runs} runs, 15 to 40 s")
-    print_sheet("Readings", figures.readings(study), "fixes with the true velocity, well conditioned")
+    show_sheet(out / "systems.md", "Systems", figures.systems(results), f"{runs} runs, 15 to 40 s")
+    caption = "fixes with the true velocity, well conditioned"
+    show_sheet(out / "readings.md", "Readings", figures.readings(study), caption)
     caption = "flip: misread states; packet_success: of the only try of a report"
-    print_sheet("Faults", figures.faults(results), caption)
+    show_sheet(out / "faults.md", "Faults", figures.faults(results), caption)
+    write_coverage(out / "coverage.md", COVERAGE)
     write_and_print_claims(out, claims, expectations)

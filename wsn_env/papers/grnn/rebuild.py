@@ -33,8 +33,10 @@ from pathlib import Path
 from wsn_env.evaluation.progress import Progress, progress_bar
 from wsn_env.filters.fingerprint import training_of
 from wsn_env.papers.claim import write_and_print_claims
+from wsn_env.papers.coverage import write_coverage
 from wsn_env.papers.grnn import figures
 from wsn_env.papers.grnn.claims import EXPECTED_RMSE_M, judge_claims, list_expectations
+from wsn_env.papers.grnn.coverage import COVERAGE
 from wsn_env.papers.grnn.pitfalls import pitfalls
 from wsn_env.papers.grnn.systems import (
     ANCHORS,
@@ -47,7 +49,7 @@ from wsn_env.papers.grnn.systems import (
     play_paper,
     scenario_as_read,
 )
-from wsn_env.papers.sheet import Sheet, prepare_folder, print_sheet, print_table, write_sheet
+from wsn_env.papers.sheet import Sheet, prepare_folder, show_sheet, show_table, write_sheet
 
 
 def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
@@ -70,7 +72,8 @@ def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
         write_sheet(out / f"{name}.csv", sheet)
     figures.write_figures(out, results)
     claims, expectations = judge_claims(results, widths), list_expectations(results, widths)
-    _print_tables(sheets, runs)
+    _show_tables(out, sheets, runs)
+    write_coverage(out / "coverage.md", COVERAGE)
     write_and_print_claims(out, claims, expectations)
 
 
@@ -99,13 +102,19 @@ def poor_start(results: Results) -> Sheet:
     return Sheet(("anchors", "start", "method", "rmse_m", "stderr_m"), rows)
 
 
-def _print_tables(sheets: dict[str, Sheet], runs: int) -> None:
+def _show_tables(out: Path, sheets: dict[str, Sheet], runs: int) -> None:
     rows = []
     for method in METHODS:
         cells = [row for row in sheets["rmse"].rows if row[0] == method]
         rows.append([METHODS[method]] + [f"{row[3]:.2f} ({row[4]:.2f})" for row in cells])
     caption = f"ring8, 3 dB; RMSE [m] (standard error), {runs} runs"
-    print_table("Error against sampling period", ("method", *(f"T = {t:g} s" for t in PERIODS_S)), rows, caption)
+    show_table(
+        out / "rmse.md",
+        "Error against sampling period",
+        ("method", *(f"T = {t:g} s" for t in PERIODS_S)),
+        rows,
+        caption,
+    )
     titles = {
         "equal_information": "At an equal information rate",
         "poor_start": "The first 5 s",
@@ -113,4 +122,4 @@ def _print_tables(sheets: dict[str, Sheet], runs: int) -> None:
         "pitfalls": "How not to evaluate",
     }
     for name, title in titles.items():
-        print_sheet(title, sheets[name])
+        show_sheet(out / f"{name}.md", title, sheets[name])

@@ -38,11 +38,13 @@ from pathlib import Path
 
 from wsn_env.evaluation.progress import Progress, progress_bar
 from wsn_env.papers.claim import write_and_print_claims
+from wsn_env.papers.coverage import write_coverage
 from wsn_env.papers.pre_dc import figures
 from wsn_env.papers.pre_dc.claims import PAPER_RMS_M, judge_claims, list_expectations
+from wsn_env.papers.pre_dc.coverage import COVERAGE
 from wsn_env.papers.pre_dc.systems import NODES, SAME_TRACKER, SYSTEMS, Results, play_paper
 from wsn_env.papers.rollout import standard_error
-from wsn_env.papers.sheet import Sheet, prepare_folder, print_table, write_sheet
+from wsn_env.papers.sheet import Sheet, prepare_folder, show_table, write_sheet
 
 
 def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
@@ -55,7 +57,8 @@ def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
     write_sheet(out / "table2.csv", table)
     write_sheet(out / "same_tracker.csv", same)
     figures.write_figures(out, results)
-    _print_tables(table, same, runs)
+    _show_tables(out, table, same, runs)
+    write_coverage(out / "coverage.md", COVERAGE)
     write_and_print_claims(out, claims, expectations)
 
 
@@ -80,13 +83,15 @@ def same_tracker(results: Results) -> Sheet:
     return Sheet(("policy", "rms_m", "stderr_m", "energy_mj"), rows)
 
 
-def _print_tables(table: Sheet, same: Sheet, runs: int) -> None:
+def _show_tables(out: Path, table: Sheet, same: Sheet, runs: int) -> None:
     rows = []
     for i in range(0, len(table.rows), len(SYSTEMS)):
         cells = table.rows[i : i + len(SYSTEMS)]
         rows.append([str(cells[0][0])] + [f"{p or '-'} / {rms:.3f} ({se:.3f})" for _, _, p, rms, se, _ in cells])
     caption = f"mean RMS [m]: paper / ours (standard error); {runs} runs, static {SYSTEMS['static'].runs_factor * runs}"
-    print_table("Table 2", ("nodes", *SYSTEMS), rows, caption)
+    show_table(out / "table2.md", "Table 2", ("nodes", *SYSTEMS), rows, caption)
     cells = [(name, f"{rms:.3f} ({se:.3f})", f"{energy:.4f}") for name, rms, se, energy in same.rows]
     caption = "225 nodes, particle filter with pooled fusion for every policy"
-    print_table("One tracker for all", ("policy", "RMS [m]", "energy [mJ/period]"), cells, caption)
+    show_table(
+        out / "same_tracker.md", "One tracker for all", ("policy", "RMS [m]", "energy [mJ/period]"), cells, caption
+    )

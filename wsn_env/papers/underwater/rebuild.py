@@ -28,9 +28,11 @@ from pathlib import Path
 
 from wsn_env.evaluation.progress import Progress, progress_bar
 from wsn_env.papers.claim import write_and_print_claims
-from wsn_env.papers.sheet import prepare_folder, print_sheet
+from wsn_env.papers.coverage import write_coverage
+from wsn_env.papers.sheet import prepare_folder, show_sheet
 from wsn_env.papers.underwater import figures
 from wsn_env.papers.underwater.claims import judge_claims, list_expectations
+from wsn_env.papers.underwater.coverage import COVERAGE
 from wsn_env.papers.underwater.systems import play_system
 
 
@@ -41,7 +43,8 @@ def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
         results = play_system(runs, show)
     claims, expectations = judge_claims(results), list_expectations(results)
     figures.write_figures(out, results)
-    print_sheet("Resampling", figures.resampling(results))
-    print_sheet("Thresholds", figures.thresholds(results))
-    print_sheet("Hysteresis of the head", figures.hysteresis(results))
+    show_sheet(out / "resampling.md", "Resampling", figures.resampling(results))
+    show_sheet(out / "thresholds.md", "Thresholds", figures.thresholds(results))
+    show_sheet(out / "hysteresis.md", "Hysteresis of the head", figures.hysteresis(results))
+    write_coverage(out / "coverage.md", COVERAGE)
     write_and_print_claims(out, claims, expectations)
