@@ -15,7 +15,7 @@ RUN := $(VENV)/bin/python
 READY := $(VENV)/.ready
 LINKS := out/types
 
-.PHONY: train pretrained test slow examples bench bench-short figures docs lint clean
+.PHONY: train pretrained test slow examples bench bench-short figures figures-trained docs lint clean
 
 train: $(READY)
 	$(RUN) train.py --resume --scenario $(SCENARIO) $(if $(LAM),--lam $(LAM))
@@ -54,9 +54,13 @@ $(VENV)/.bench: $(READY)
 	$(RUN) -m pip install $(PIP) -c constraints.txt -e ".[test,bench]"
 	touch $@
 
-# Every table and picture of the pages that a command makes and that needs no training; half an hour.
+# Every table and picture of the pages that a command makes and that needs no training; an hour.
 figures: $(READY)
 	$(RUN) docs/figures.py
+
+# Those of trained policies; a night.
+figures-trained: $(READY)
+	$(RUN) docs/figures.py seeds fronts transfer ablations algorithms
 
 # The documentation site, warnings as errors; out/docs/index.html.
 docs: $(VENV)/.docs

@@ -1,11 +1,12 @@
 """Every table and picture of the pages that a command makes: the commands, and the pages filled with what they wrote.
 
-    python docs/figures.py                      # all that need no training; half an hour
-    python docs/figures.py reproduce            # one of MAKERS
+    python docs/figures.py                      # all that need no training; an hour on 2 cores
+    python docs/figures.py reproduce tables     # some of MAKERS
     python docs/figures.py --fill               # the pages anew from what is there in out/figures
 
-A command writes tables as NAME.md, and pictures, into out/figures/COMMAND. A page shows them between markers,
-`<!-- begin COMMAND/NAME -->` and `<!-- end COMMAND/NAME -->`, and as `images/COMMAND/NAME.png`.
+A command writes tables as NAME.md, and pictures, into out/figures/MAKER. A page shows them between markers,
+`<!-- begin MAKER/NAME -->` and `<!-- end MAKER/NAME -->`, and as `images/MAKER/NAME.png`. Makers that train policies
+take hours and run when they are named; what they have trained they take again.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import shutil
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from wsn_env.evaluation.files import replacing
@@ -25,9 +27,62 @@ HERE = Path(__file__).parent
 ROOT = HERE.parent
 OUT = ROOT / "out" / "figures"
 IMAGES = HERE / "images"
-MAKERS: dict[str, list[str]] = {  # name: module and arguments; `--out FOLDER` is added
-    "reproduce": ["wsn_env", "reproduce", "all"],
+RUNS = "out/figures/runs"
+SIZES = [f"{stem}{n}" for stem in ("nearest", "informed") for n in range(9)]
+SEEDS = {"PreDC-v0": 3, "Rssi-v0": 3, "Binary-v0": 1, "Anchors-v0": 1, "Underwater-v0": 1}  # trainings of each
+STEPS = {"Rssi-v0": 4_000_000}
+FRONT_LAMS = [0.3 * 10 ** (k / 12) for k in range(25)]  # 0.3 .. 30
+RULES = {  # beside adaptive, greedy and static_cluster
+    "PreDC-v0": [*SIZES[:9], "pre_dc", "centroid"],
+    "Rssi-v0": [*SIZES, "adaptive_informed", "pre_dc", "centroid"],
+    "Binary-v0": [*SIZES[9:], "adaptive_informed", "boundary", "random"],
+    "Anchors-v0": [*SIZES, "adaptive_informed"],
+    "Underwater-v0": [*SIZES, "adaptive_informed", "strongest_signal"],
 }
+
+
+def trainings(scenario: str) -> list[list[str]]:
+    """Of the policies that the pages compare."""
+    steps = str(STEPS.get(scenario, 3_000_000))
+    options = ["train.py", "--resume", "--scenario", scenario, "--steps", steps, "--episodes", "0"]
+    return [[*options, "--seed", str(k * 10**6), "--runs", f"{RUNS}/{k}"] for k in range(SEEDS[scenario])]
+
+
+def trained(scenario: str) -> list[str]:
+    """Where they are."""
+    return ["--policies", *(f"{RUNS}/{k}/{scenario}" for k in range(SEEDS[scenario]))]
+
+
+def compared(scenario: str, lams: Sequence[float] = ()) -> list[list[str]]:
+    """Those policies beside the rules, at these lams; none: the scenario's octaves."""
+    rules = ["--rules", *RULES[scenario], "adaptive", "greedy", "static_cluster"]
+    asked = ["-m", "studies.seeds", "--scenario", scenario, *trained(scenario), *rules, "--out", f"{{out}}/{scenario}"]
+    return [*trainings(scenario), [*asked, *(["--lam", *(f"{lam:.3g}" for lam in lams)] if lams else [])]]
+
+
+MAKERS: dict[str, list[list[str]]] = {  # arguments of Python, one command after the other; {out}: its folder
+    "reproduce": [["-m", "wsn_env", "reproduce", "all", "--out", "{out}"]],
+    "tables": [["-m", "studies.tables", "--out", "{out}"]],
+    "bound": [["-m", "studies.bound", "--out", "{out}"]],
+    "planning": [
+        ["-m", "studies.planning", "--scenario", name, "--out", "{out}/" + name] for name in ("PreDC-v0", "Rssi-v0")
+    ],
+}
+TRAINING_MAKERS: dict[str, list[list[str]]] = {
+    "seeds": [command for name in SEEDS for command in compared(name)],
+    "fronts": [command for name in ("PreDC-v0", "Rssi-v0") for command in compared(name, FRONT_LAMS)],
+    "transfer": [
+        command
+        for name in ("PreDC-v0", "Rssi-v0")
+        for command in (
+            *trainings(name),
+            ["-m", "studies.transfer", "--scenario", name, *trained(name), "--out", "{out}"],
+        )
+    ],
+    "ablations": [["-m", "studies.ablations", "--scenario", "Rssi-v0", "--out", "{out}"]],
+    "algorithms": [["-m", "studies.algorithms", "--scenario", "Rssi-v0", "--out", "{out}"]],
+}
+ALL = MAKERS | TRAINING_MAKERS
 
 
 def pages() -> list[Path]:
@@ -36,12 +91,14 @@ def pages() -> list[Path]:
 
 
 def make(name: str) -> None:
-    """Run a command; what it wrote before is gone."""
+    """Run its commands; what they wrote before is gone, but for what a training goes on from."""
     folder = OUT / name
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
+    if name in MAKERS:
+        shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True, exist_ok=True)
     start = time.perf_counter()
-    subprocess.run([sys.executable, "-m", *MAKERS[name], "--out", str(folder)], cwd=ROOT, check=True)
+    for command in ALL[name]:
+        subprocess.run([sys.executable, *(part.format(out=folder) for part in command)], cwd=ROOT, check=True)
     print(f"{name}: {time.perf_counter() - start:.0f} s", flush=True)
 
 
@@ -51,7 +108,7 @@ def fill(out: Path = OUT) -> list[Path]:
     Raises:
         ValueError: if a page names a table that its command did not write.
     """
-    made = [name for name in MAKERS if (out / name).is_dir()]
+    made = [name for name in ALL if (out / name).is_dir()]
     changed = []
     for page in pages():
         old = page.read_text(encoding="utf-8")
@@ -77,12 +134,12 @@ def fill(out: Path = OUT) -> list[Path]:
 def main() -> None:
     """Run commands, fill pages."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("names", nargs="*", help=f"of {', '.join(MAKERS)}; left out: all")
+    parser.add_argument("names", nargs="*", help=f"of {', '.join(ALL)}; left out: the first {len(MAKERS)}")
     parser.add_argument("--fill", action="store_true", help="run nothing")
     asked = parser.parse_args()
-    unknown = [name for name in asked.names if name not in MAKERS]
+    unknown = [name for name in asked.names if name not in ALL]
     if unknown:
-        parser.error(f"names = {unknown}: unknown; allowed are {', '.join(MAKERS)}")
+        parser.error(f"names = {unknown}: unknown; allowed are {', '.join(ALL)}")
     for name in [] if asked.fill else asked.names or MAKERS:
         make(name)
     for page in fill():

@@ -53,7 +53,7 @@ if __name__ == "__main__":
     env = gym.make("wsn_env/PreDC-v0", measurement=Bearing(sd_deg=3), particles=1000)
     env.reset(seed=1)
     infos = [env.step(env.action_space.sample())[4] for _ in range(100)]
-    print("random clusters: RMS {episode_rms_m:.2f} m, bound {episode_bound_m:.2f} m".format(**infos[-1]))
+    print("random clusters: RMS {episode_rms_m:.2f} m, reference {episode_reference_m:.2f} m".format(**infos[-1]))
     scenario = wsn_env.Scenario.named("PreDC-v0", measurement=Bearing(sd_deg=3), particles=1000)
     for row in wsn_env.evaluate(["greedy", "informed2"], scenario, episodes=3).rows:
         print(f"{row['policy']}: RMS {row['rms_m']:.2f} m, {row['energy_mj']:.3f} mJ a period")

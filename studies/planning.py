@@ -7,14 +7,17 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import tyro
 
 from wsn_env.agents.planner import Planner
-from wsn_env.evaluation.comparison import evaluate
+from wsn_env.evaluation.comparison import Evaluation, evaluate
+from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.policies import Policy, make_policy
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.models.state import Cluster
+from wsn_env.reports.markdown import markdown_table
 from wsn_env.reports.tables import print_tables
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.view import View
@@ -58,6 +61,8 @@ class Comparison:
     """Periods that the planner looks ahead."""
     worlds: int = Planner.worlds
     """Worlds that it imagines for each choice."""
+    out: Path = Path("out/planning")
+    """Folder for planning.md."""
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -66,20 +71,33 @@ def main(arguments: list[str] | None = None) -> None:
     scenario = Scenario.named(settings.scenario, **({} if settings.lam is None else {"lam": settings.lam}))
     planner = Planner(scenario, settings.horizon, settings.worlds)
     planner.act(View.of(World(scenario).reset([0])))  # compiles and rehearses
-    policies = {"planner": planner} | {name: make_policy(name, scenario) for name in settings.against}
+    names = ["ppo", *settings.against]
+    policies = {"planner": planner} | {name: make_policy(name, scenario) for name in names}
     timed = {name: Timed(policy) for name, policy in policies.items()}
     with progress_bar() as report:
         found = evaluate(timed, scenario, None, settings.episodes, settings.seed, progress=report, threads=1)
     print_tables(found)
     for lam in found.lams:
         rival = max(settings.against, key=lambda name: found.values(name, lam, "return").mean())
-        gain, share = found.difference("planner", rival, lam), -100 / found.values(rival, lam, "return").mean()
-        print(
-            f"planner - {rival}: {gain.mean:+.2f} [{gain.low:+.2f}, {gain.high:+.2f}] m,"
-            f" {share * gain.mean:+.1f} % [{share * gain.low:+.1f}, {share * gain.high:+.1f}]"
-        )
-    for name in ("planner", rival):
-        print(f"{name}: {1e3 * timed[name].seconds / timed[name].decisions:.3g} ms a decision on one core")
+        text = table(found, lam, ["planner", "ppo", rival], timed)
+        print(text)
+    settings.out.mkdir(parents=True, exist_ok=True)
+    with replacing(settings.out / "planning.md") as path:
+        path.write_text(text)
+
+
+def table(found: Evaluation, lam: float, names: list[str], timed: dict[str, Timed]) -> str:
+    """Return of each, what the planner is ahead of it in percent, and what a decision costs."""
+    rows = []
+    for name in names:
+        own = found.values(name, lam, "return")
+        gain, share = found.difference("planner", name, lam), -100 / own.mean()
+        ahead = f"{share * gain.mean:+.1f} [{share * gain.low:+.1f}, {share * gain.high:+.1f}] %"
+        cost = f"{1e3 * timed[name].seconds / timed[name].decisions:.2g} ms"
+        returned = f"{own.mean():.1f} ({own.std(ddof=1) / len(own) ** 0.5:.1f})"
+        rows.append([name, returned, "" if name == "planner" else ahead, cost])
+    columns = (f"{found.scenario.name}, lam = {lam:g}", "return", "planner ahead of it", "a decision, one core")
+    return markdown_table(columns, rows)
 
 
 if __name__ == "__main__":

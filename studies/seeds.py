@@ -51,7 +51,7 @@ class Comparison:
     seed: int = 0
     """Which."""
     out: Path = Path("out/seeds")
-    """Folder for evaluation.csv and seeds.md; a second call continues."""
+    """Folder for evaluation.csv, table.md and hypervolume.md; a second call continues."""
 
 
 def main() -> int:
@@ -65,13 +65,12 @@ def main() -> int:
     with progress_bar() as report:
         evaluation = evaluate(policies, scenario, lams, asked.episodes, asked.seed, keep=asked.out, progress=report)
     evaluation.save(asked.out)
-    text = "\n".join(
-        [table(evaluation, list(trained)), list_bounds(evaluation, list(trained)), list_volumes(evaluation, trained)]
-    )
-    with replacing(asked.out / "seeds.md") as path:
-        path.write_text(text)
+    parts = {"table": table(evaluation, list(trained)), "hypervolume": table_of_volumes(evaluation, trained)}
+    for name, text in parts.items():
+        with replacing(asked.out / f"{name}.md") as path:
+            path.write_text(text)
+        print(text)
     remove_kept_blocks(asked.out)
-    print(text)
     return 0
 
 
@@ -129,29 +128,20 @@ def table(evaluation: Evaluation, trained: list[str]) -> str:
     return markdown_table(["policy", *(f"{lam:g}" for lam in lams)], rows)
 
 
-def list_bounds(evaluation: Evaluation, trained: list[str]) -> str:
-    """RMS over the bound at the middle lam."""
-    lam = evaluation.lams[len(evaluation.lams) // 2]
-    lines = [f"RMS error over the bound of its own schedule, lam = {lam:g}:", ""]
-    for name in evaluation.policies:
-        ratio = evaluation.rms_over_bound(name, lam)
-        if ratio is not None:
-            lines.append(f"- {name}: {ratio.mean:.3f} [{ratio.low:.3f}, {ratio.high:.3f}]")
-    return "\n".join(lines) + "\n"
-
-
-def list_volumes(evaluation: Evaluation, trained) -> str:
+def table_of_volumes(evaluation: Evaluation, trained) -> str:
     """Hypervolume of the union of all rules, and of each training's front with the paired difference to it."""
     reference = reference_point(evaluation.scenario)
     by_policy = {name: policy_points(evaluation, name) for name in evaluation.policies}
     rules = join_points(points for name, points in by_policy.items() if name not in trained)
-    lines = []
+    rows = []
     for name in trained:
         own, theirs = hypervolumes({name: by_policy[name], "rules": rules}, reference)
         ahead = theirs.difference
-        lines.append(f"- {name}: {own.hypervolume.mean:.4f}; {ahead.mean:+.4f} [{ahead.low:+.4f}, {ahead.high:+.4f}]")
-    whole = f"all rules together {theirs.hypervolume.mean:.4f}"
-    return "\n".join([f"Hypervolume up to {reference[0]:g} m, {reference[1]:g} mJ: {whole}", *lines]) + "\n"
+        difference = f"{ahead.mean:+.4f} [{ahead.low:+.4f}, {ahead.high:+.4f}]"
+        rows.append([name, f"{own.hypervolume.mean:.4f}", difference])
+    rows.append(["all rules together", f"{theirs.hypervolume.mean:.4f}", ""])
+    columns = (f"hypervolume up to {reference[0]:g} m, {reference[1]:g} mJ", "m mJ", "ahead of all rules together")
+    return markdown_table(columns, rows)
 
 
 if __name__ == "__main__":

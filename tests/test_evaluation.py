@@ -56,7 +56,8 @@ def test_a_row_replays_in_the_environment(evaluation):
         assert row["error_m"] == pytest.approx(np.mean([info["error_m"] for info in infos]), rel=1e-12)
         assert row["rms_m"] == pytest.approx(info["episode_rms_m"], rel=1e-12)
         assert (
-            row["bound_m"] == info["episode_bound_m"] and row["bound_all_awake_m"] == info["episode_bound_all_awake_m"]
+            row["reference_m"] == info["episode_reference_m"]
+            and row["reference_all_awake_m"] == info["episode_reference_all_awake_m"]
         )
         assert row["energy_mj"] == pytest.approx(np.mean([info["energy_mj"] for info in infos]), rel=1e-12)
         assert row["members"] == np.mean([info["members"] for info in infos])
@@ -67,7 +68,7 @@ def test_a_row_replays_in_the_environment(evaluation):
 def test_return_is_made_of_error_and_energy(evaluation):
     for row in evaluation.rows:
         assert row["return"] == pytest.approx(-row["periods"] * (row["error_m"] + row["lam"] * row["energy_mj"]))
-        assert 0 < row["bound_all_awake_m"] <= row["bound_m"] * (1 + 1e-9)
+        assert 0 < row["reference_all_awake_m"] <= row["reference_m"] * (1 + 1e-9)
 
 
 def test_policies_meet_common_random_numbers():

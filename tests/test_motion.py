@@ -359,3 +359,18 @@ def test_cruises_without_room_are_refused(overrides, says):
     with pytest.raises(ScenarioError) as problem:
         tracks(1, **CRUISE, **overrides)
     assert says in str(problem.value)
+
+
+def test_a_free_target_follows_its_law_and_may_leave_the_field():
+    """Variances of start and end in the large: P0, and F P0 F' + q^2 sum of (F^k G)(F^k G)'; 4,000 tracks, 4.5 sds."""
+    scenario = Scenario.named("PreDC-v0", motion="free", speed_ms=0.3, acceleration_ms2=0.05)
+    count, periods = 4000, scenario.periods
+    tracks = np.empty((count, periods + 1, 4))
+    Tracks(scenario).draw(np.ones(count, bool), np.arange(count, dtype=np.uint64), tracks, 1)
+    end = 8.0**2 + (100 * 0.3) ** 2 + 0.05**2 * sum((k + 0.5) ** 2 for k in range(periods))
+    for axis in (0, 2):
+        for period, variance in ((0, 8.0**2), (periods, end)):
+            found = tracks[:, period, axis]
+            assert abs(found.mean() - 50) < 4.5 * (variance / count) ** 0.5
+            assert abs(found.var() / variance - 1) < 4.5 * (2 / count) ** 0.5
+    assert ((tracks[:, -1, ::2] < 0) | (tracks[:, -1, ::2] > 100)).any(axis=1).mean() > 0.1

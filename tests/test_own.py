@@ -41,13 +41,13 @@ def run(folder, *arguments):
     return done.stdout
 
 
-def test_the_particle_filter_tracks_by_bearings_near_the_bound(bearing):
+def test_the_particle_filter_tracks_by_bearings_near_the_reference(bearing):
     """Three bearings of 2 degrees at some 5 m: errors of a few decimetres."""
     scenario = Scenario.named("PreDC-v0", measurement=bearing(sd_deg=2), **SMALL | {"particles": 2000})
     rows = evaluate(["all", "informed2", "greedy"], scenario, episodes=6, threads=1).rows
     rms = {name: np.mean([row["rms_m"] for row in rows if row["policy"] == name]) for name in ("all", "informed2")}
-    bound = np.mean([row["bound_m"] for row in rows if row["policy"] == "all"])
-    assert 0.9 * bound < rms["all"] < 1.5 * bound and rms["all"] < rms["informed2"] < 1.5
+    reference = np.mean([row["reference_m"] for row in rows if row["policy"] == "all"])
+    assert 0.9 * reference < rms["all"] < 1.5 * reference and rms["all"] < rms["informed2"] < 1.5
 
 
 def test_a_sharper_sensor_tracks_better(bearing):

@@ -150,11 +150,13 @@ def test_bad_parameters_are_named():
         Planner(binary, particles=0).act(View.of(World(binary, threads=1).reset([1])))
 
 
-def test_the_comparison_tells_what_a_decision_costs(capsys):
-    main("--episodes 1 --horizon 2 --worlds 4 --lam 2 --against nearest0 nearest1".split())
-    printed = capsys.readouterr().out
-    assert "PreDC-v0, lam = 2 m/mJ" in printed and "planner - nearest" in printed
-    assert "planner: " in printed and " ms a decision on one core" in printed
+def test_the_comparison_tells_what_a_decision_costs(tmp_path, capsys):
+    asked = f"--episodes 2 --horizon 2 --worlds 4 --lam 2 --against nearest0 nearest1 --out {tmp_path}"
+    main(asked.split())
+    assert "PreDC-v0, lam = 2 m/mJ" in capsys.readouterr().out
+    head, _, planner, ppo, rival = (tmp_path / "planning.md").read_text().splitlines()
+    assert head.startswith("| PreDC-v0, lam = 2 |") and all(" ms |" in line for line in (planner, ppo, rival))
+    assert planner.startswith("| planner | -") and ppo.startswith("| ppo | -") and rival.startswith("| nearest")
 
 
 @pytest.mark.slow

@@ -6,8 +6,9 @@ import sys
 import numpy as np
 import pytest
 
-from studies import ablations, seeds, transfer
+from studies import ablations, seeds, tables, transfer
 from studies.report import draw_curves, learning_curve, over_seeds, table
+from tests.figures import check_tables
 from wsn_env import Scenario
 from wsn_env.agents.ppo import PRETRAINED
 
@@ -20,12 +21,13 @@ def test_several_trainings_against_rules(tmp_path, monkeypatch, capsys):
     asked += ["--rules", "nearest0", "nearest2", "pre_dc", "adaptive", "--out", str(tmp_path)]
     monkeypatch.setattr(sys, "argv", ["seeds", *asked])
     assert seeds.main() == 0
-    text = (tmp_path / "seeds.md").read_text()
-    assert text.strip() in capsys.readouterr().out
+    text, volumes = ((tmp_path / f"{name}.md").read_text() for name in ("table", "hypervolume"))
+    shown = capsys.readouterr().out
+    assert text.strip() in shown and volumes.strip() in shown
     own = re.search(r"\| \*\*PPO\*\*, one policy \| \*\*(-[\d.]+)\*\* \((-[\d.]+) to (-[\d.]+)\)", text)
     assert len(set(own.groups())) == 1  # twice the same policy
     assert re.search(r"\| best of nearest0\.\.2 \| [02]: -", text) and "| pre_dc | -" in text
-    both = re.findall(r"- ppo\d: ([\d.]+); ", text)
+    both = re.findall(r"\| ppo\d \| ([\d.]+) \|", volumes)
     assert len(both) == 2 and both[0] == both[1] and (tmp_path / "evaluation.csv").exists()
 
 
@@ -84,3 +86,16 @@ def test_learning_curves_join_resumed_runs_and_leave_cut_episodes_out(tmp_path):
     assert (tmp_path / "curves.png").stat().st_size > 10_000
     with pytest.raises(ValueError, match="nowhere: no progress"):
         learning_curve(tmp_path / "nowhere")
+
+
+def test_the_pages_small_tables_are_what_is_measured(tmp_path):
+    """A tenth of the episodes; those of shipped policies have a test of their own (test_pretrained.py)."""
+    names = ["reference_points", "honesty", "silence", "anchors"]
+    tables.main(["--episodes", "40", "--only", *names, "--out", str(tmp_path)])
+    check_tables("environment.md", "tables", tmp_path, share=0.1)
+    check_tables("results.md", "tables", tmp_path, share=0.1)
+
+
+def test_an_unknown_table_is_named(capsys):
+    assert tables.main(["--only", "honestly"]) == 2
+    assert "honestly" in capsys.readouterr().err

@@ -13,6 +13,7 @@ from wsn_env.envs.registration import register_envs
 if TYPE_CHECKING:
     from wsn_env.envs.env import ClusterEnv as ClusterEnv
     from wsn_env.envs.vector_env import ClusterVectorEnv as ClusterVectorEnv
+    from wsn_env.evaluation.bound import error_bound as error_bound
     from wsn_env.evaluation.comparison import evaluate as evaluate
     from wsn_env.evaluation.policies import make_policy as make_policy
     from wsn_env.evaluation.scoring import score as score
@@ -37,6 +38,7 @@ _HOMES = {
     "ClusterEnv": "wsn_env.envs.env",
     "ClusterVectorEnv": "wsn_env.envs.vector_env",
     "evaluate": "wsn_env.evaluation.comparison",
+    "error_bound": "wsn_env.evaluation.bound",
     "score": "wsn_env.evaluation.scoring",
     "make_policy": "wsn_env.evaluation.policies",
     "register_envs": "wsn_env.envs.registration",

@@ -18,7 +18,7 @@ from wsn_env.models.measurement.base import Order
 from wsn_env.models.state import OUTCOME, Outcome, State
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.quantities import Quantities
-from wsn_env.simulation.bound import Bound, bound_kind
+from wsn_env.simulation.reference import Reference, has_reference
 from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World
 
@@ -74,7 +74,7 @@ class ClusterEnv(gym.Env):
         self._lam, self._period = 0.0, 0
         self._squares = 0.0
         self._detections = 0
-        self._bound = None if bound_kind(self.scenario) == "none" else Bound(self.scenario)
+        self._reference = Reference(self.scenario) if has_reference(self.scenario) else None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """A new episode: seed fixes field, track and every draw."""
@@ -86,8 +86,8 @@ class ClusterEnv(gym.Env):
         self._squares = 0.0
         self._detections = 0
         info = self._reward_and_info(outcome)[1]
-        if self._bound is not None:
-            info["bound_m"] = self._bound.begin(self._state).item()
+        if self._reference is not None:
+            info["reference_m"] = self._reference.begin(self._state).item()
         if self._camera is not None:
             self._camera.begin(self._state, outcome, [True])
             self._camera.show(self._state)
@@ -106,8 +106,8 @@ class ClusterEnv(gym.Env):
         if self._period > self.scenario.unscored:
             self._squares += info["error_m"] * info["error_m"]
         self._detections += info["detections"]
-        if self._bound is not None:
-            info["bound_m"] = self._bound.advance(self._state, outcome).item()
+        if self._reference is not None:
+            info["reference_m"] = self._reference.advance(self._state, outcome).item()
         if self._camera is not None:
             self._camera.add(self._state, outcome)
             self._camera.show(self._state)
@@ -115,10 +115,9 @@ class ClusterEnv(gym.Env):
         if truncated:
             info["episode_rms_m"] = math.sqrt(self._squares / self.scenario.scored)
             info["antnp"] = self._detections / self.scenario.periods
-            if self._bound is not None:
-                info["episode_bound_m"] = self._bound.episode_m().item()
-                if self._bound.kind == "bound":
-                    info["episode_bound_all_awake_m"] = self._bound.bound_all_awake_m(self._state).item()
+            if self._reference is not None:
+                info["episode_reference_m"] = self._reference.episode_m().item()
+                info["episode_reference_all_awake_m"] = self._reference.all_awake_m(self._state).item()
         return self._observe(), reward, False, truncated, info
 
     def _reward_and_info(self, outcome: Outcome) -> tuple[float | np.ndarray, dict[str, Any]]:

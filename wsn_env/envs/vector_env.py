@@ -20,7 +20,7 @@ from wsn_env.models.measurement.base import Order
 from wsn_env.models.state import State
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.quantities import Quantities
-from wsn_env.simulation.bound import Bound, bound_kind
+from wsn_env.simulation.reference import Reference, has_reference
 from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World
 
@@ -83,9 +83,9 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self._squares = np.zeros(num_envs)
         self._detections = np.zeros(num_envs, dtype=np.int64)
         self._ended = np.zeros(num_envs, dtype=bool)
-        self._bound = None
-        if bound_kind(self.scenario) != "none":
-            self._bound = Bound(self.scenario, self.num_envs, self.world.threads)
+        self._reference = None
+        if has_reference(self.scenario):
+            self._reference = Reference(self.scenario, self.num_envs, self.world.threads)
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
@@ -133,8 +133,8 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self._detections[rows] = 0
         self._ended = self._ended & ~rows
         info = self.interface.reward_and_info(outcome.row, self._state.lam)[1]
-        if self._bound is not None:
-            info["bound_m"] = self._bound.begin(self._state, rows)
+        if self._reference is not None:
+            info["reference_m"] = self._reference.begin(self._state, rows)
         if self._camera is not None:
             self._camera.begin(self._state, outcome, rows)
         return info
@@ -154,8 +154,8 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         reward, info = self.interface.reward_and_info(outcome.row, self._state.lam)
         self._squares += np.where(self._state.period > self.scenario.unscored, outcome.error_m * outcome.error_m, 0.0)
         self._detections += outcome.detections
-        if self._bound is not None:
-            info["bound_m"] = self._bound.advance(self._state, outcome)
+        if self._reference is not None:
+            info["reference_m"] = self._reference.advance(self._state, outcome)
         if self._camera is not None:
             self._camera.add(self._state, outcome)
         if begins:  # next-step mode: these rows only begin
@@ -177,10 +177,9 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         """What sums up an episode, of the rows that end."""
         periods = self.scenario.periods
         info = {"episode_rms_m": np.sqrt(self._squares / self.scenario.scored), "antnp": self._detections / periods}
-        if self._bound is not None:
-            info["episode_bound_m"] = self._bound.episode_m()
-            if self._bound.kind == "bound":
-                info["episode_bound_all_awake_m"] = self._bound.bound_all_awake_m(self._state, rows)
+        if self._reference is not None:
+            info["episode_reference_m"] = self._reference.episode_m()
+            info["episode_reference_all_awake_m"] = self._reference.all_awake_m(self._state, rows)
         return info
 
     def _restart_within_step(

@@ -27,11 +27,11 @@ from wsn_env.evaluation.rollout import BLOCK, Block, Engine, change_lam, evaluat
 from wsn_env.evaluation.versions import versions
 from wsn_env.models.quantity import suggest
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.bound import bound_kind
+from wsn_env.simulation.reference import has_reference
 
 COLUMNS = (
     "policy scenario lam episode seed periods return error_m rms_m energy_mj members handovers searches lost"
-    " bound_m bound_all_awake_m anees variance_ratio"
+    " reference_m reference_all_awake_m anees variance_ratio"
 ).split()
 Row = dict[str, str | float]  # of the columns in COLUMNS
 MEANS = ("return", "rms_m", "error_m", "energy_mj", "members", "handovers", "searches", "lost")
@@ -71,17 +71,17 @@ class Evaluation:
         """Means with intervals of the quantities in MEANS."""
         return {column: Summary.of(self.values(policy, lam, column)) for column in MEANS}
 
-    def rms_over_bound(self, policy: str, lam: float) -> Summary | None:
-        """Root of the mean squared error over the mean squared bound, of all episodes; None: there is no bound."""
-        if bound_kind(self.scenario) == "none":
+    def rms_over_reference(self, policy: str, lam: float) -> Summary | None:
+        """Root of the mean squared error over the mean squared reference, of all episodes; None: there is none."""
+        if not has_reference(self.scenario):
             return None
-        return Summary.of_root_ratio(*(self.values(policy, lam, column) ** 2 for column in ("rms_m", "bound_m")))
+        return Summary.of_root_ratio(*(self.values(policy, lam, column) ** 2 for column in ("rms_m", "reference_m")))
 
-    def bound_all_awake_m(self) -> float | None:
-        """Root mean square of the bound with all nodes awake, the same for every policy; None: there is no bound."""
-        if bound_kind(self.scenario) == "none":
+    def reference_all_awake_m(self) -> float | None:
+        """Root mean square of the reference with all nodes awake, the same for every policy; None: there is none."""
+        if not has_reference(self.scenario):
             return None
-        return float(np.sqrt(np.mean(self.values(self.policies[0], self.lams[0], "bound_all_awake_m") ** 2)))
+        return float(np.sqrt(np.mean(self.values(self.policies[0], self.lams[0], "reference_all_awake_m") ** 2)))
 
     def difference(self, policy: str, reference: str, lam: float, column: str = "return") -> Summary:
         """Paired difference policy - reference over the common episodes."""
@@ -128,18 +128,18 @@ class Evaluation:
             {"policy": policy, "lam": lam}
             | {column: vars(value) for column, value in self.summary(policy, lam).items()}
             | {f"return_minus_{self.policies[0]}": vars(self.difference(policy, self.policies[0], lam))}
-            | self._compare_to_bound(policy, lam)
+            | self._compare_to_reference(policy, lam)
             for lam in self.lams
             for policy in self.policies
         ]
         with replacing(out / "evaluation.json") as path:
             path.write_text(json.dumps(self.settings() | {"versions": versions(), "means": means}, indent=1))
 
-    def _compare_to_bound(self, policy: str, lam: float) -> dict[str, object]:
-        ratio = self.rms_over_bound(policy, lam)
+    def _compare_to_reference(self, policy: str, lam: float) -> dict[str, object]:
+        ratio = self.rms_over_reference(policy, lam)
         if ratio is None:
             return {}
-        return {f"rms_over_{bound_kind(self.scenario)}": vars(ratio), "bound_all_awake_m": self.bound_all_awake_m()}
+        return {"rms_over_reference": vars(ratio), "reference_all_awake_m": self.reference_all_awake_m()}
 
     def settings(self) -> dict[str, Any]:
         """What was asked for."""

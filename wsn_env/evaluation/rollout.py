@@ -11,7 +11,7 @@ from wsn_env.compiled import draws
 from wsn_env.evaluation.policies import Policy
 from wsn_env.models.state import Cluster, Outcome, State
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.bound import Bound, bound_kind
+from wsn_env.simulation.reference import Reference, has_reference
 from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World
 
@@ -74,8 +74,8 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
     sums: dict[str, Any] = dict.fromkeys(names, 0.0)
     counted_periods, ratios = np.zeros(len(seeds)), np.zeros(len(seeds))
     regular_periods, nees_sums = np.zeros(len(seeds)), np.zeros(len(seeds))
-    bound = None if bound_kind(scenario) == "none" else Bound(scenario, len(seeds), world.threads)
-    begin = None if bound is None else lambda state, _: bound.begin(state)
+    reference = Reference(scenario, len(seeds), world.threads) if has_reference(scenario) else None
+    begin = None if reference is None else lambda state, _: reference.begin(state)
     for state, outcome in episodes(policy, world, seeds, begin):
         square, believed = outcome.error_m**2, outcome.posterior_rms_m**2
         sums["error"] += outcome.error_m
@@ -91,8 +91,8 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
         sums["handovers"] += outcome.handover
         sums["searches"] += outcome.searched
         sums["lost"] += outcome.error_m > 2 * scenario.radius_m
-        if bound is not None:
-            bound.advance(state, outcome)
+        if reference is not None:
+            reference.advance(state, outcome)
     n = scenario.periods
     columns = {
         "lam": state.lam,
@@ -107,8 +107,8 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
         "handovers": sums["handovers"].astype(int),
         "searches": sums["searches"].astype(int),
         "lost": sums["lost"].astype(int),
-        "bound_m": np.full(len(seeds), "") if bound is None else bound.episode_m(),
-        "bound_all_awake_m": np.full(len(seeds), "") if bound is None else bound.bound_all_awake_m(state),
+        "reference_m": np.full(len(seeds), "") if reference is None else reference.episode_m(),
+        "reference_all_awake_m": np.full(len(seeds), "") if reference is None else reference.all_awake_m(state),
         "anees": nees_sums / np.maximum(regular_periods, 1),
         "variance_ratio": ratios / np.maximum(counted_periods, 1),
     }

@@ -12,6 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from rich.markup import escape
 from rich.table import Table
 
@@ -105,7 +106,16 @@ def show_sheet(path: Path, title: str, sheet: Sheet, caption: str | None = None)
     shown = [i for i, name in enumerate(sheet.columns) if not name.startswith("stderr")]
     rows = []
     for row in sheet.rows:
-        cells = ["-" if v is None else f"{v:.4g}" if isinstance(v, float) else str(v) for v in row]
-        errors = (f" ({cells[i + 1]})" if i + 1 < len(row) and i + 1 not in shown else "" for i in shown)
-        rows.append([cells[i] + error for i, error in zip(shown, errors, strict=True)])
+        errors = (row[i + 1] if i + 1 < len(row) and i + 1 not in shown else None for i in shown)
+        rows.append([_shown(row[i], error) for i, error in zip(shown, errors, strict=True)])
     show_table(path, title, [sheet.columns[i] for i in shown], rows, caption)
+
+
+def _shown(value: Any, error: float | None) -> str:
+    """For people: four digits, or as many as a standard error of two digits leaves."""
+    if value is None:
+        return "-"
+    if error and np.isfinite(error):
+        digits = max(0, 1 - int(np.floor(np.log10(error))))
+        return f"{value:.{digits}f} ({error:.{digits}f})"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -17,7 +17,7 @@ from wsn_env.evaluation.front import (
     split_number,
 )
 from wsn_env.reports.pictures import escape_label
-from wsn_env.reports.plots import draw_bound_line, label_decades
+from wsn_env.reports.plots import draw_reference_line, label_decades
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,7 +55,7 @@ def draw_fronts(evaluation: Evaluation, found: Fronts) -> Figure:
     left = min((point.energy.low for point in drawn if point.energy.low > 0), default=energy / 10) / MARGIN
     bottom = min((point.error.low for point in drawn if point.error.low > 0), default=error / 10) / MARGIN**0.5
     axes.plot([left, energy, energy], [error, error, bottom], "--", color=GREY, linewidth=1, zorder=1)
-    draw_bound_line(axes, evaluation)
+    draw_reference_line(axes, evaluation)
     axes.annotate(
         "reference point",
         (energy, error),

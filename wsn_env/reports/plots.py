@@ -11,14 +11,13 @@ from wsn_env.envs.rendering.colours import BLUE, DARK, GREEN, GREY, VERMILION
 from wsn_env.evaluation.comparison import Evaluation, stem_of
 from wsn_env.evaluation.intervals import Summary
 from wsn_env.reports.pictures import escape_label
-from wsn_env.simulation.bound import bound_kind
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
-EMPHASIS, FAMILY, OTHER, BOUND = VERMILION, BLUE, DARK, GREEN
+EMPHASIS, FAMILY, OTHER, REFERENCE = VERMILION, BLUE, DARK, GREEN
 NARROW = 3  # energies that span less are drawn on a linear axis
 ROUND = sqrt(pi) / 2  # mean error over RMS of a round Gaussian in the plane
 
@@ -27,7 +26,7 @@ def draw_comparison(evaluation: Evaluation, lam: float, emphasis: str | None = N
     """Figure of mean error against energy with intervals, and the curve of equal return through one policy.
 
     Policies that differ by a number at the end of their names are joined by a line, and labelled by the number. The
-    bound with all nodes awake is drawn as the mean error of a round Gaussian of its RMS (sqrt(pi) / 2 of it).
+    reference with all nodes awake is drawn as the mean error of a round Gaussian of its RMS (sqrt(pi) / 2 of it).
 
     Args:
         lam: one of the evaluation's.
@@ -48,7 +47,7 @@ def draw_comparison(evaluation: Evaluation, lam: float, emphasis: str | None = N
             (points[policy][0].mean, points[policy][1].mean) for policy in points if stem_of(policy) == stem
         )
         axes.plot(*zip(*family), color=FAMILY, linewidth=1, label=escape_label(evaluation.family_name(stem)), zorder=1)
-    draw_bound_line(axes, evaluation)
+    draw_reference_line(axes, evaluation)
     energies = [energy.mean for energy, _ in points.values()]
     if max(energies) > NARROW * min(energies) > 0:
         axes.set_xscale("log")
@@ -77,12 +76,12 @@ def label_decades(axis: Axis) -> None:
     axis.set_tick_params(which="both", labelsize=9)
 
 
-def draw_bound_line(axes: Axes, evaluation: Evaluation) -> None:
-    """A line at the mean error of a round Gaussian whose RMS is the bound with all nodes awake, if there is one."""
-    all_awake_m = evaluation.bound_all_awake_m()
+def draw_reference_line(axes: Axes, evaluation: Evaluation) -> None:
+    """A line at the mean error of a round Gaussian whose RMS is the reference with all nodes awake, if there is one."""
+    all_awake_m = evaluation.reference_all_awake_m()
     if all_awake_m is not None:
-        label = f"{bound_kind(evaluation.scenario)} with all nodes awake: {all_awake_m:.3g} m RMS"
-        axes.axhline(ROUND * all_awake_m, color=BOUND, linewidth=1, linestyle=":", label=label)
+        label = f"reference with all nodes awake: {all_awake_m:.3g} m RMS"
+        axes.axhline(ROUND * all_awake_m, color=REFERENCE, linewidth=1, linestyle=":", label=label)
 
 
 def _draw_point(axes: Axes, policy: str, energy: Summary, error: Summary, strong: bool, numbered: bool) -> None:

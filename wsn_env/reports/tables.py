@@ -9,32 +9,29 @@ from wsn_env.evaluation.comparison import Evaluation
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.intervals import Summary
 from wsn_env.reports.markdown import markdown_table
-from wsn_env.simulation.bound import bound_kind
+from wsn_env.simulation.reference import has_reference
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-HEADER = ("policy", "return", "{} - policy", "RMS m", "RMS / {}", "energy mJ/period", "awake", "lost")
+OVER_REFERENCE = "RMS / reference"
+HEADER = ("policy", "return", "{} - policy", "RMS m", OVER_REFERENCE, "energy mJ/period", "awake", "lost")
 
 
 def table_header(evaluation: Evaluation, reference: str) -> list[str]:
     """Names of the columns of `table_rows`."""
-    kind = bound_kind(evaluation.scenario)
-    names = [name.format(reference if name == "{} - policy" else kind) for name in HEADER]
-    return [name for name in names if name != "RMS / none"]
+    names = [name.format(reference) for name in HEADER]
+    return names if has_reference(evaluation.scenario) else [name for name in names if name != OVER_REFERENCE]
 
 
-def describe_bound(evaluation: Evaluation) -> str:
-    """What the column of the bound holds, in a sentence."""
-    all_awake_m = evaluation.bound_all_awake_m()
+def describe_reference(evaluation: Evaluation) -> str:
+    """What the column of the Cramer-Rao reference holds, in a sentence."""
+    all_awake_m = evaluation.reference_all_awake_m()
     if all_awake_m is None:
         if evaluation.scenario.measurement.lasting_errors:
-            return "no Cramer-Rao bound: the errors of a beacon's levels last over periods"
-        return "no Cramer-Rao bound: a bit that jumps at an edge has no Fisher information"
-    what = {
-        "bound": "posterior Cramer-Rao bound of the reports delivered",
-        "reference": "Cramer-Rao recursion of the reports delivered, which can be beaten here: no bound",
-    }[bound_kind(evaluation.scenario)]
+            return "no Cramer-Rao reference: the errors of a beacon's levels last over periods"
+        return "no Cramer-Rao reference: a bit that jumps at an edge has no Fisher information"
+    what = "Cramer-Rao recursion on the values of the reports delivered, which an estimate may beat"
     return f"RMS over the {what}; the same for all nodes awake and heard: {all_awake_m:.3f} m"
 
 
@@ -43,7 +40,7 @@ def table_rows(evaluation: Evaluation, lam: float, reference: str) -> list[tuple
     rows = []
     for policy in evaluation.policies:
         s = evaluation.summary(policy, lam)
-        ratio = evaluation.rms_over_bound(policy, lam)
+        ratio = evaluation.rms_over_reference(policy, lam)
         difference = (
             "" if policy == reference else format_interval(evaluation.difference(reference, policy, lam), 2, "+")
         )
@@ -93,7 +90,7 @@ def print_tables(evaluation: Evaluation, reference: str | None = None, console: 
     for lam in evaluation.lams:
         title = f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes"
         caption = f"means, 95 % bootstrap intervals; {reference} - policy: paired difference of returns"
-        lines = f"{caption}; {describe_bound(evaluation)}", *describe_best_in_hindsight(evaluation, lam)
+        lines = f"{caption}; {describe_reference(evaluation)}", *describe_best_in_hindsight(evaluation, lam)
         table = Table(title=title, caption="\n".join(lines))
         for name in table_header(evaluation, reference):
             table.add_column(name, justify="left" if name == "policy" else "right")
@@ -112,7 +109,7 @@ def save_markdown(evaluation: Evaluation, folder: str | Path) -> None:
     parts = [
         f"## {evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes\n\n"
         + format_markdown(evaluation, lam, evaluation.policies[0])
-        + f"\nMeans with 95 % bootstrap intervals; {describe_bound(evaluation)}.\n"
+        + f"\nMeans with 95 % bootstrap intervals; {describe_reference(evaluation)}.\n"
         + "".join(f"\n{line}\n" for line in describe_best_in_hindsight(evaluation, lam))
         for lam in evaluation.lams
     ]

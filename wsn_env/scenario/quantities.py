@@ -52,6 +52,7 @@ class Quantities(TypedDict, total=False):
     acceleration_ms2: float
     speed_ms: float
     inset_m: float
+    spread_m: float
     start_m: tuple[float, float]
     legs: tuple[tuple[float, float, float], ...]
     tracks: tuple[str, ...]

@@ -1,265 +1,119 @@
-"""How good an estimate could have been: the posterior Cramer-Rao bound of the reports that were really delivered.
+"""A lower bound on the error of any tracker: the posterior Cramer-Rao bound of a policy in a scenario.
 
-The recursion of Tichavsky, Muravchik & Nehorai (1998, eq. 21) for the constant velocity model,
+For all that reports can tell and whatever computes with it,
 
-    J' = (F J^-1 F' + q^2 G G')^-1 + sum over the reports of H' R^-1 H
+    E |estimate(k) - target(k)|^2  >=  trace of the position part of J(k)^-1
+    J(k) = (F J(k-1)^-1 F' + q^2 G G')^-1 + E[sum over the awake nodes of I]
 
-with H at the true state. It runs on P = J^-1, since G G' is singular. P0 is the first belief's covariance, and q the
-target's own acceleration noise, not the filter's.
+(Tichavsky, Muravchik & Nehorai, 1998, eq. 21), with I the Fisher information of all that an awake node can tell about
+the position: that it detects or keeps silent, and what it then measures (`DetectionRule.information`). The expectation
+is over tracks, fields, noise and, as a policy chooses by what it has heard, schedules; here it is the mean over the
+episodes played. An estimator knows the first belief, so that the mean may be taken along and across its velocity.
 
-The *bound with all nodes awake* is the same for a network in which every node is awake throughout and every report
-arrives. It depends on field, track and key alone, so that it is one number an episode, whatever the schedule.
-
-Both are made of the truth: for loggers and tables, never for policies.
+It is a bound where the recursion's suppositions are the world's, and only there (`has_bound`): tracks of nearly
+constant velocity from a normal start, never redrawn or reflected; a start known with an error N(0, P0); no search,
+whose choice of a head tells of strengths; reports whose errors are independent. J(0) is the information of P0 and
+of the start's own covariance together. A lost report counts as if it had arrived: its sender's battery may tell of it
+later.
 """
+
+from __future__ import annotations
 
 import numpy as np
 
-from wsn_env.compiled.arrays import record
-from wsn_env.compiled.kernels import Pinned, lean_kernel, lean_piece, over_rows, threads_for
-from wsn_env.models.detection.base import detects, stream_of
-from wsn_env.models.measurement.base import at_point, linearise, node_at
-from wsn_env.models.motion.prediction import predict_covariance
+from wsn_env.compiled.kernels import lean_kernel, lean_piece, over_rows
+from wsn_env.models.detection.base import information
+from wsn_env.models.measurement.base import node_at
 from wsn_env.models.state import Outcome, State, state_at
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import constants
-from wsn_env.simulation.episode import start_record
-from wsn_env.simulation.geometry import cells_within
-
-KINDS = ("bound", "reference", "none")
-MANY_ROWS = 512  # from here on the short work of a period is shared among threads
-
-MEMORY = record(
-    [
-        ("cov", "f8", (4, 4)),  # P after the last period
-        ("squares", "f8"),  # sum over the episode's periods of the squared bound [m^2]
-    ]
-)
+from wsn_env.simulation.reference import value_information
 
 
-def bound_kind(scenario: Scenario) -> str:
-    """What the recursion means in a scenario: one of KINDS.
-
-    "bound": no estimate from the values of the reports can do better on average. With positions it is exact, and that
-    of the Kalman filter that knows q. With strengths H is that of each episode's own track, which makes the mean over
-    episodes a little larger than the bound with H averaged.
-
-    "reference": the same recursion, but an estimate may do better, because
-    - the motion has no process noise of its own (the filter's q stands in), or
-    - the first belief is not the law of the truth about it (every start but "known"), or
-    - who reports and who keeps silent tells something beside the values: with a threshold on the level, and for
-      silent members with `silent_information`.
-
-    "none": binary sensors, since a bit that jumps at an edge has no Fisher information; and a beacon's levels, whose
-    errors last over periods.
-    """
-    if not scenario.measurement.independent:
-        return "none"
-    own_noise = scenario.motion.process_noise_ms2 is not None
-    tells_more = scenario.tracking.silent_information or scenario.detection.values_decide
-    return "bound" if own_noise and scenario.tracking.start == "known" and not tells_more else "reference"
-
-
-def process_noise(scenario: Scenario) -> float:
-    """sd of the target's own white acceleration [m/s^2]; the filter's where the motion has none."""
-    own = scenario.motion.process_noise_ms2
-    return scenario.filter_q if own is None else own
+def has_bound(scenario: Scenario) -> bool:
+    """Whether the suppositions of the bound are the scenario's."""
+    tracking, motion = scenario.tracking, scenario.motion
+    own_law = motion.start_sds is not None and motion.process_noise_ms2 is not None
+    return scenario.measurement.independent and own_law and tracking.start == "known" and not tracking.search
 
 
 class Bound:
-    """The bounds of B rows, a period after the other.
+    """The bound of a policy, from the episodes that it plays: `begin` and `advance` as they go, then `rms_m`."""
 
-    `begin` at the start of an episode, then `advance` once a period; `episode_m` and `bound_all_awake_m` at its end.
-    """
-
-    def __init__(self, scenario: Scenario, rows: int = 1, threads: int = 1) -> None:
+    def __init__(self, scenario: Scenario, threads: int = 1) -> None:
         """Prepare.
 
-        Args:
-            scenario: of any kind but "none".
-            rows: B.
-            threads: at most so many share the work. No bit depends on it.
+        Raises:
+            ValueError: where it would be no bound.
         """
-        if bound_kind(scenario) == "none":
-            kind = type(scenario.measurement).__name__
-            raise ValueError(f"Scenario.measurement = {kind}: has no Cramer-Rao bound; allowed are all others")
-        self.kind: str = bound_kind(scenario)
-        self._periods, self._threads = scenario.periods, threads
-        self._constants, self._start = constants(scenario), start_record(scenario)
-        self._constants["tracking"]["q"] = process_noise(scenario)
-        if scenario.detection.values_decide:
-            self._constants["reach_m"] = np.inf  # noise lifts a level over the threshold from anywhere
-        self._memory, self._advance = np.zeros(rows, MEMORY), Pinned(_advance)
+        if not has_bound(scenario):
+            raise ValueError(
+                f"scenario = {scenario.name}, motion {type(scenario.motion).__name__}: has no bound; allowed are"
+                " a motion with a normal start (motion='free'), start='known', search=False and a measurement whose"
+                " errors are independent"
+            )
+        self._scenario, self._constants, self._threads = scenario, constants(scenario), threads
+        self._sums = np.zeros((scenario.periods, 3))  # of information along, across and along times across [1/m^2]
+        self._episodes = 0
 
-    def begin(self, state: State, rows: np.ndarray | None = None) -> np.ndarray:
-        """New episodes; a search in period 0 counts.
+    def begin(self, state: State) -> None:
+        """New episodes, in period 0."""
+        velocity = state.belief.row["mean"][:, [1, 3]]
+        self._along = velocity / np.maximum(np.hypot(*velocity.T), 1e-12)[:, None]
+        self._episodes += state.rows
 
-        Args:
-            state: in period 0 of them.
-            rows: (B,) bool, which; None: all.
+    def advance(self, state: State, outcome: Outcome) -> None:
+        """One period of all of them; `state` is that after it."""
+        found = np.empty((state.rows, 3))
+        args = self._constants, outcome.row, state.handle, self._along, found
+        over_rows(_information_of_awake, state.rows, self._threads, *args)
+        self._sums[state.row["period"][0] - 1] += found.sum(axis=0)
 
-        Returns: (B,) the bound now [m]; of other rows as it was.
-        """
-        rows = np.ones(len(self._memory), bool) if rows is None else np.asarray(rows, bool)
-        bound_m = np.empty(len(rows))
-        _begin(self._constants, self._start, rows, state.handle, self._memory, bound_m)
-        return bound_m
+    def per_period_m(self) -> np.ndarray:
+        """(periods,) root of the least mean square error in each period [m]."""
+        t, q = self._scenario.period_s, self._scenario.motion.process_noise_ms2
+        f, g = np.kron(np.eye(2), [[1.0, t], [0.0, 1.0]]), np.kron(np.eye(2), [[t * t / 2], [t]])
+        tracking, own = self._scenario.tracking, self._scenario.motion.start_sds
+        sds = np.array([[tracking.start_sd_m, tracking.start_sd_ms], own])
+        cov = np.diag(np.tile(1.0 / (sds**-2.0).sum(axis=0), 2))
+        squares = []
+        for along, across, both in self._sums / self._episodes:
+            cov = f @ cov @ f.T + q * q * (g @ g.T)
+            told = np.zeros((4, 4))
+            told[np.ix_([0, 2], [0, 2])] = (along, both), (both, across)
+            cov = np.linalg.solve(np.eye(4) + cov @ told, cov)
+            squares.append(cov[0, 0] + cov[2, 2])
+        return np.sqrt(squares)
 
-    def advance(self, state: State, outcome: Outcome) -> np.ndarray:
-        """One period.
-
-        Args:
-            state: after it.
-            outcome: what it brought.
-
-        Returns: (B,) root of the trace of P's position part [m].
-        """
-        rows = len(self._memory)
-        bound_m = np.empty(rows)
-        threads = 1 if rows < MANY_ROWS else self._threads
-        over_rows(self._advance, rows, threads, self._constants, outcome.row, state.handle, self._memory, bound_m)
-        return bound_m
-
-    def episode_m(self) -> np.ndarray:
-        """(B,) root of the mean square over the horizon of what `advance` has returned [m]."""
-        return np.sqrt(self._memory["squares"] / self._periods)
-
-    def bound_all_awake_m(self, state: State, rows: np.ndarray | None = None) -> np.ndarray:
-        """The bound with all nodes awake throughout: the root of the mean square over the horizon [m].
-
-        Args:
-            state: in any period of the episode.
-            rows: (B,) bool, which; None: all.
-
-        Returns: (B,), 0 in other rows.
-        """
-        rows = np.ones(state.rows, bool) if rows is None else np.asarray(rows, bool)
-        memory, threads = np.zeros(len(rows), MEMORY), threads_for(rows, self._threads)
-        over_rows(_play_all_awake, len(rows), threads, self._constants, self._start, rows, state.handle, memory)
-        return np.sqrt(memory["squares"] / self._periods)
+    def rms_m(self) -> float:
+        """Root mean square over the periods [m]: no tracker's root mean square error is lower."""
+        return float(np.sqrt(np.mean(self.per_period_m() ** 2)))
 
 
 @lean_kernel
-def _begin(cs, starts, rows, handle, memory, bound_m):
-    state, c = state_at(handle), cs[0]
-    for b in range(len(rows)):
-        own = memory[b]
-        if rows[b]:
-            _start_anew(own, starts[0])
-            nodes, truth = state.reports.node[b, : state.reports.count[b]], state.track[b, 0]
-            xx, xy, yy = _information_of(nodes, state.network.positions[b], truth[0], truth[2], c)
-            _correct(own.cov, xx, xy, yy)
-        bound_m[b] = np.sqrt(own.cov[0, 0] + own.cov[2, 2])
-
-
-@lean_kernel
-def _advance(start, stop, cs, outcomes, handle, memory, bound_m):
+def _information_of_awake(start, stop, cs, outcomes, handle, along, found):
+    """(B, 3) of each row's awake nodes, along and across its direction."""
     state, c = state_at(handle), cs[0]
     for b in range(start, stop):
-        out = outcomes[b]
-        nodes = state.reports.node[b, : out.delivered]
-        xx, xy, yy = _information_of(nodes, state.network.positions[b], out.target_m[0], out.target_m[1], c)
-        bound_m[b] = np.sqrt(_take_period(memory[b], xx, xy, yy, c))
-
-
-@lean_kernel
-def _play_all_awake(start, stop, cs, starts, rows, handle, memory):
-    """A whole episode with all nodes awake, in the rows marked; `memory` holds what the last period leaves."""
-    state, c = state_at(handle), cs[0]
-    for b in range(start, stop):
-        if not rows[b]:
-            continue
-        own = memory[b]
-        _start_anew(own, starts[0])
-        if starts[0].searches:
-            xx, xy, yy = _information_of_all(state, b, 0, c)
-            _correct(own.cov, xx, xy, yy)
-        for k in range(1, state.track.shape[1]):
-            xx, xy, yy = _information_of_all(state, b, k, c)
-            _take_period(own, xx, xy, yy, c)
-
-
-@lean_piece
-def _start_anew(own, s):
-    """P0, as the episode's first belief has it."""
-    own.cov[:] = 0.0
-    own.cov[0, 0] = own.cov[2, 2] = s.sd_m * s.sd_m
-    own.cov[1, 1] = own.cov[3, 3] = s.sd_ms * s.sd_ms
-    own.squares = 0.0
-
-
-@lean_piece
-def _take_period(own, xx, xy, yy, c):
-    """Predict, correct; returns the trace of the position part."""
-    predict_covariance(own.cov, c.period_s, c.tracking.q, own.cov)
-    _correct(own.cov, xx, xy, yy)
-    square = own.cov[0, 0] + own.cov[2, 2]
-    own.squares += square
-    return square
-
-
-@lean_piece
-def _information(node, positions, x, y, c):
-    """H' R^-1 H of one report about the position: its xx, xy and yy [1/m^2]."""
-    xx, xy, yy = 0.0, 0.0, 0.0
-    for line in linearise(c.measurement, node_at(positions, node), at_point(x, y)):
-        weight = 1.0 / line.variance
-        xx += weight * line.slope_x * line.slope_x
-        xy += weight * line.slope_x * line.slope_y
-        yy += weight * line.slope_y * line.slope_y
-    return xx, xy, yy
-
-
-@lean_piece
-def _information_of(nodes, positions, x, y, c):
-    """Of the period's reports."""
-    xx, xy, yy = 0.0, 0.0, 0.0
-    for node in nodes:
-        one = _information(node, positions, x, y, c)
-        xx, xy, yy = xx + one[0], xy + one[1], yy + one[2]
-    return xx, xy, yy
-
-
-@lean_piece
-def _information_of_all(state, b, period, c):
-    """Of every node that would detect the target, if it were awake."""
-    positions, grid, truth = state.network.positions[b], state.network.grid, state.track[b, period]
-    x, y, place, starts = truth[0], truth[2], grid.row[b], grid.starts[b]
-    stream = stream_of(c.detection, state.key[b], period)
-    first, last, left, right = cells_within(place, x, y, c.reach_m)
-    xx, xy, yy = 0.0, 0.0, 0.0
-    for line in range(first, last + 1):
-        for slot in range(starts[line * place.side + left], starts[line * place.side + right + 1]):
-            node = grid.nodes[b, slot]
-            if detects(c.detection, c.measurement, stream, node_at(positions, node), x, y):
-                one = _information(node, positions, x, y, c)
+        network, x, y = state.network, outcomes[b].target_m[0], outcomes[b].target_m[1]
+        xx, xy, yy = 0.0, 0.0, 0.0
+        for i in range(-1, network.row[b].n_members):
+            node = network.members[b, i] if i >= 0 else network.row[b].head
+            if node >= 0:
+                one = _information_of(node_at(network.positions[b], node), x, y, c)
                 xx, xy, yy = xx + one[0], xy + one[1], yy + one[2]
-    return xx, xy, yy
+        s, t = along[b]
+        found[b, 0] = s * s * xx + 2.0 * s * t * xy + t * t * yy
+        found[b, 1] = t * t * xx - 2.0 * s * t * xy + s * s * yy
+        found[b, 2] = s * t * (yy - xx) + (s * s - t * t) * xy
 
 
 @lean_piece
-def _correct(cov, xx, xy, yy):
-    """(P^-1 + J)^-1 for information J about the position, in place: two rank-one corrections, by J = L D L'."""
-    first, second, most, least = (0, 2, xx, yy) if xx >= yy else (2, 0, yy, xx)
-    if most > 0.0:
-        tilt = xy / most
-        _correct_along(cov, first, second, tilt, most)
-        rest = least - tilt * xy
-        if rest > 0.0:
-            _correct_along(cov, second, first, 0.0, rest)
-
-
-@lean_piece
-def _correct_along(cov, i, j, tilt, information):
-    """Of a measurement of x_i + tilt x_j."""
-    spread = cov[i, i] + tilt * (2.0 * cov[i, j] + tilt * cov[j, j])
-    gain = information / (1.0 + information * spread)
-    moved = (
-        cov[0, i] + tilt * cov[0, j],
-        cov[1, i] + tilt * cov[1, j],
-        cov[2, i] + tilt * cov[2, j],
-        cov[3, i] + tilt * cov[3, j],
-    )
-    for k in range(4):
-        for n in range(4):
-            cov[k, n] -= gain * (moved[k] * moved[n])
+def _information_of(node, x, y, c):
+    """xx, xy and yy of an awake node [1/m^2]."""
+    dx, dy = x - node.x, y - node.y
+    squared = max(dx * dx + dy * dy, 1e-12)
+    share, along = information(c.detection, c.measurement, np.sqrt(squared))
+    xx, xy, yy = value_information(node, x, y, c)
+    sight = along / squared
+    return share * xx + sight * dx * dx, share * xy + sight * dx * dy, share * yy + sight * dy * dy

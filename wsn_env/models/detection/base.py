@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 LEAST, MOST = 1e-6, 1.0 - 1e-6  # probabilities as a filter takes them: no report rules a particle out
 POINT = 1.7320508075688772  # sds: Gauss and Hermite's three points
+STEP = 1e-5  # of a radius, for the slope of a probability
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ class DetectionRule(Kind):
         "detects",
         "weigh_detection",
         "weigh_silence",
+        "information",
     )
 
     values_decide: ClassVar[bool] = False  # whether the measured value decides, so that detecting tells of the value
@@ -103,6 +105,19 @@ class DetectionRule(Kind):
             p = probability(d, m, np.float64(np.sqrt(dx * dx + dy * dy)))
             log_weights[i] += F(log(1.0 - delivery * min(max(p, LEAST), MOST)))
 
+    @staticmethod
+    def information(d: Any, m: Any, distance: float) -> tuple[float, float]:
+        """Fisher information about the target of all that an awake node can tell, value and silence alike.
+
+        Returns: what share of the value's information H' R^-1 H a node tells on average; and beside it, along the line
+            of sight [1/m^2], what it tells by detecting or not. Here p and p'^2 / (p (1 - p)).
+        """
+        p, step = probability(d, m, distance), min(STEP * d.radius_m, 0.5 * distance)
+        change = probability(d, m, distance + step) - probability(d, m, distance - step)
+        if change == 0.0 or p <= 0.0 or p >= 1.0:
+            return p, 0.0
+        return p, (0.5 * change / step) ** 2 / (p * (1.0 - p))
+
 
 @by_kind
 def probability(d: Any, m: Any, distance: float) -> Any:
@@ -114,3 +129,4 @@ stream_of: Any = by_kind(DetectionRule.stream_of)
 detects: Any = by_kind(DetectionRule.detects)
 weigh_detection: Any = by_kind(DetectionRule.weigh_detection)
 weigh_silence: Any = by_kind(DetectionRule.weigh_silence)
+information: Any = by_kind(DetectionRule.information)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from wsn_env.compiled import draws
-from wsn_env.compiled.elementary import F, exp32, log32, log_normal_cdf32, normal_cdf
+from wsn_env.compiled.elementary import HALF_PI, F, exp, exp32, log32, log_normal_cdf32, normal_cdf
 from wsn_env.models.detection.base import DetectionRule
 from wsn_env.models.detection.radius import cube_root
 from wsn_env.models.measurement.base import level, level_slope, sample
@@ -75,6 +75,16 @@ class Threshold(DetectionRule):
         sds = (level(m, likely) - d.threshold_db) / m.noise
         steepness = 1.5 * mean * mean * level_slope(m, likely) / m.noise
         return normal_cdf(sds / np.sqrt(1.0 + steepness * steepness * root * root * variance))
+
+    @staticmethod
+    def information(d: Any, m: Any, distance: float) -> tuple[float, float]:
+        """Of a normal level that is known above the threshold, and below it only that it is below.
+
+        1 - Phi(a) + a phi(a) + phi(a)^2 / Phi(a),   a = (threshold - h(d)) / sigma
+        """
+        a = (d.threshold_db - level(m, distance * distance)) / m.noise
+        below, density = normal_cdf(a), exp(-0.5 * a * a) / np.sqrt(4.0 * HALF_PI)
+        return max(1.0 - below + a * density + (density * density / below if below > 0.0 else 0.0), 0.0), 0.0
 
     @staticmethod
     def stream_of(d: Any, key: Any, period: int) -> Any:

@@ -26,8 +26,8 @@ class Free(Motion):
     allocates: ClassVar[bool] = False
     bounded: ClassVar[bool] = False
     fitting_q: ClassVar[float] = 0.025
-    spread_m: float = quantity(15.0, "sd of the start about the field's middle, along each axis", above=0)
-    speed_ms: float = quantity(0.4, "sd of the velocity at the start, along each axis", above=0)
+    spread_m: float = quantity(8.0, "sd of the start about the field's middle, along each axis", above=0)
+    speed_ms: float = quantity(0.15, "sd of the velocity at the start, along each axis", above=0)
     acceleration_ms2: float = quantity(0.025, "sd of the white acceleration on the track (q)", at_least=0)
 
     @property

@@ -19,7 +19,7 @@ from wsn_env.reports.pages.learning_curves import learning_sections
 from wsn_env.reports.pages.page import build_page, collapsible, image, section, table, values_table
 from wsn_env.reports.pages.samples import sample_sections
 from wsn_env.reports.plots import draw_comparison
-from wsn_env.reports.tables import describe_best_in_hindsight, describe_bound, table_header, table_rows
+from wsn_env.reports.tables import describe_best_in_hindsight, describe_reference, table_header, table_rows
 
 REPORT_FILE = "report.html"
 NEAR = 6  # policies in the picture of every lam, besides the first
@@ -70,7 +70,7 @@ def _comparison_sections(evaluation: Evaluation) -> list[str]:
     parts = [
         f"<p>{evaluation.episodes:,} paired episodes of each policy and lam: all meet the same fields, tracks,"
         f" detections and noises. Means with 95 % bootstrap intervals; <i>{html.escape(reference)} - policy</i> is the"
-        f" paired difference of returns. About the bound: {html.escape(describe_bound(evaluation))}.</p>"
+        f" paired difference of returns. About the reference: {html.escape(describe_reference(evaluation))}.</p>"
     ]
     for lam in evaluation.lams:
         rows = [table_header(evaluation, reference), *table_rows(evaluation, lam, reference)]

@@ -1,0 +1,224 @@
+"""Small tables of the pages, each from a few evaluations of rules and of the policies that come with the package.
+
+    python -m studies.tables --out out/tables
+    python -m studies.tables --only honesty --episodes 50
+
+Every figure stands with its standard error over the episodes.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import tyro
+
+from studies.seeds import best_of, format_advantage
+from wsn_env.agents.ppo import PRETRAINED
+from wsn_env.evaluation.comparison import evaluate
+from wsn_env.evaluation.files import replacing
+from wsn_env.evaluation.policies import make_policy
+from wsn_env.evaluation.progress import progress_bar
+from wsn_env.evaluation.rollout import BLOCK, evaluation_seeds, rollout
+from wsn_env.reports.markdown import markdown_table
+from wsn_env.scenario import Scenario, named_scenarios
+from wsn_env.simulation.world import World
+
+Rows = Iterable[list[str]]
+COSTLY = {  # the most expensive competitive policy of each scenario
+    "PreDC-v0": "static_cluster",
+    "Rssi-v0": "static_cluster",
+    "Binary-v0": "boundary",
+    "Anchors-v0": "static_cluster",
+    "Underwater-v0": "strongest_signal",
+    "Ble-v0": "all",
+}
+HONESTY = (  # scenario, policy, what is changed, what that shows
+    ("PreDC-v0", "nearest3", "", "the filter's q is twice the track's, 0.05 against 0.025 m/s²"),
+    ("PreDC-v0", "nearest3", "filter_q=0.025", "with the track's own q it is honest"),
+    ("PreDC-v0", "nearest3", "fusion=pooled filter_q=0.025", "pooling weighs each member's share of particles apart"),
+    ("Rssi-v0", "informed3", "", "q, as above"),
+    ("Rssi-v0", "informed3", "filter_q=0.025", "with the track's own q it is honest"),
+    ("Anchors-v0", "nearest3", "", "q is twice the track's, 1 against 0.5 m/s²"),
+    ("Anchors-v0", "nearest3", "filter_q=0.5", "with the track's own q it is honest"),
+    ("Binary-v0", "boundary", "", "q is three times the track's, and an edge of 1 m is believed where there is none"),
+    ("Binary-v0", "boundary", "edge_m=0.3", "with a sharper edge particles run short now and then"),
+    ("Binary-v0", "informed3", "", "the same"),
+    ("Underwater-v0", "strongest_signal", "", "spread copies widen the cloud"),
+    ("Underwater-v0", "strongest_signal", "resampling=systematic", "repeated copies let it collapse: far too sure"),
+    ("Ble-v0", "informed3", "", "a level's likelihood counts with an exponent of 0.7, for recorded rooms"),
+    ("Ble-v0", "informed3", "temper=1", "with an exponent of 1 most of it is gone"),
+)
+
+
+@dataclass
+class Tables:
+    """Which tables, from how many episodes."""
+
+    only: list[str] = field(default_factory=list)
+    """Names; left out: all."""
+    episodes: int = 400
+    """Of each cell; those of shipped policies have 1,000 with the default."""
+    out: Path = Path("out/tables")
+    """Folder."""
+
+
+def figure(values: np.ndarray, digits: int) -> str:
+    """Mean and standard error."""
+    return f"{values.mean():.{digits}f} ({values.std(ddof=1) / len(values) ** 0.5:.{digits}f})"
+
+
+def root_figure(squares: np.ndarray, digits: int) -> str:
+    """Root of the mean, and its standard error."""
+    root = np.sqrt(squares.mean())
+    return f"{root:.{digits}f} ({squares.std(ddof=1) / len(squares) ** 0.5 / (2 * root):.{digits}f})"
+
+
+def play(scenario: Scenario, policy: str, episodes: int) -> dict[str, np.ndarray]:
+    """Columns of an evaluation's first episodes."""
+    made, world, seeds = make_policy(policy, scenario), World(scenario), evaluation_seeds(0, episodes)
+    rows = [row for first in range(0, episodes, BLOCK) for row in rollout(made, world, seeds[first : first + BLOCK])]
+    return {column: np.array([row[column] for row in rows]) for column in rows[0]}
+
+
+def scenario_of(name: str, settings: str = "") -> Scenario:
+    """A preset with changes as on the command line, at its middle lam."""
+    from wsn_env.cli import make_scenario
+
+    scenario = make_scenario(name, settings.split(), [])
+    return scenario if not isinstance(scenario.lam, tuple) else scenario.override(lam=scenario.lam_octaves[2])
+
+
+def reference_points(episodes: int) -> tuple[list[str], Rows]:
+    """The reference point of each scenario beside what it was chosen by."""
+    columns = ["scenario", "`reference_error_m`", "error of the head alone (nearest0) m", "`reference_energy_mj`"]
+    rows = []
+    for name, costly in COSTLY.items():
+        scenario = scenario_of(name)
+        alone, dear = play(scenario, "nearest0", episodes), play(scenario, costly, episodes)
+        points = f"{scenario.reference_error_m:g}", f"{scenario.reference_energy_mj:g}"
+        energy = f"{figure(dear['energy_mj'], 2)}, {costly}"
+        rows.append([name, points[0], figure(alone["error_m"], 2), points[1], energy])
+    return [*columns, "energy of the most expensive competitive policy mJ"], rows
+
+
+def honesty(episodes: int) -> tuple[list[str], Rows]:
+    """Whether filters expect the error that they have."""
+    rows = []
+    for name, policy, settings, why in HONESTY:
+        found = play(scenario_of(name, settings), policy, episodes)
+        ratios = figure(found["anees"], 2), figure(found["variance_ratio"], 2)
+        what = f"{name}, {policy}" + (f", {settings}" if settings else "")
+        rows.append([what, *ratios, root_figure(found["rms_m"] ** 2, 3), why])
+    return ["scenario, policy, changes", "ANEES", "e² / trace", "RMS m", "why"], rows
+
+
+def silence(episodes: int) -> tuple[list[str], Rows]:
+    """What it is worth to weigh particles by who kept silent."""
+    rows = []
+    for name in ("PreDC-v0", "Rssi-v0"):
+        squares = [
+            play(scenario_of(name, f"silent_information={told}"), "nearest3", episodes)["rms_m"] ** 2
+            for told in (False, True)
+        ]
+        rows.append([name, *(root_figure(each, 3) for each in squares)])
+    return ["nearest3", "RMS m, the values alone", "RMS m, also who reported"], rows
+
+
+def anchors(episodes: int) -> tuple[list[str], Rows]:
+    """What few anchors tell."""
+    rows = []
+    for policy in ("nearest1", "informed1", "informed3", "all"):
+        found = play(scenario_of("Anchors-v0"), policy, episodes)
+        rows.append([policy, root_figure(found["rms_m"] ** 2, 2), figure(found["energy_mj"], 3)])
+    return ["Anchors-v0", "RMS m", "energy mJ a period"], rows
+
+
+def shipped(name: str, episodes: int, rules: tuple[str, ...] = ()) -> tuple[list[str], Rows]:
+    """Returns of the policy that comes with the package, and of rules, at six trade-offs."""
+    scenario = Scenario.named(name)
+    lams = scenario.lam_octaves
+    found = evaluate(["ppo", *rules], scenario, lams, whole(episodes))
+    rows = [[name, *(figure(found.values("ppo", lam, "return"), 1) for lam in lams)]]
+    rows += [[rule, *(figure(found.values(rule, lam, "return"), 1) for lam in lams)] for rule in rules]
+    return ["lam m/mJ", *(f"{lam:g}" for lam in lams)], rows
+
+
+def comparison(name: str, episodes: int) -> tuple[list[str], Rows]:
+    """The policy that comes with the package beside rules, and what it is ahead of them in percent."""
+    scenario, lams = Scenario.named(name), (1.0, 4.0, 16.0)
+    sizes = [f"nearest{n}" for n in range(9)]
+    others = {"size by the belief's spread, tuned for each lam": "adaptive"}
+    others |= {"information for energy, tuned for each lam": "greedy", "Pre-DC": "pre_dc"}
+    found = evaluate(["ppo", *sizes, *others.values()], scenario, lams, whole(episodes))
+    rows = [["**PPO**", *(f"**{found.values('ppo', lam, 'return').mean():.1f}**" for lam in lams)]]
+    best = {lam: best_of(found, sizes, lam) for lam in lams}
+    for label, rule in {"best size in hindsight": "", **others}.items():
+        cells = []
+        for lam in lams:
+            rival = rule or best[lam]
+            theirs = figure(found.values(rival, lam, "return"), 1)
+            cells.append(f"{theirs}: {format_advantage(found, ['ppo'], rival, lam)}")
+        rows.append([label, *cells])
+    return [name, *(f"lam = {lam:g}" for lam in lams)], rows
+
+
+def references(episodes: int) -> tuple[list[str], Rows]:
+    """How near to the Cramer-Rao reference the usual filter comes, at lam = 4."""
+    names, rows = ("ppo", "greedy", "adaptive", "nearest2"), []
+    for scenario in ("PreDC-v0", "Rssi-v0"):
+        found = evaluate(names, Scenario.named(scenario), [4.0], episodes)
+        ratios = [found.rms_over_reference(name, 4.0) for name in names]
+        rows.append([scenario, *(f"{ratio.mean:.2f} [{ratio.low:.2f}, {ratio.high:.2f}]" for ratio in ratios)])
+    return ["RMS / reference, lam = 4", *names], rows
+
+
+def whole(episodes: int) -> int:
+    """A thousand where the default is asked for: for what is compared by a percent."""
+    return 1000 if episodes == Tables.episodes else episodes
+
+
+TABLES: dict[str, Callable[[int], tuple[list[str], Rows]]] = {
+    "reference_points": reference_points,
+    "honesty": honesty,
+    "silence": silence,
+    "anchors": anchors,
+    "references": references,
+    "comparison_PreDC-v0": partial(comparison, "PreDC-v0"),
+    "comparison_Rssi-v0": partial(comparison, "Rssi-v0"),
+} | {
+    f"shipped_{path.parent.name}": partial(
+        shipped, path.parent.name, rules=("greedy", "all") if path.parent.name == "Ble-v0" else ()
+    )
+    for path in sorted(PRETRAINED.glob("*/policy.json"))
+}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Make, print and write NAME.md."""
+    asked = tyro.cli(Tables, args=arguments, description=__doc__)
+    unknown = [name for name in asked.only if name not in TABLES]
+    if unknown:
+        print(f"tables: only = {unknown}: unknown; allowed are {', '.join(TABLES)}", file=sys.stderr)
+        return 2
+    asked.out.mkdir(parents=True, exist_ok=True)
+    names = asked.only or list(TABLES)
+    with progress_bar() as report:
+        for i, name in enumerate(names):
+            report(i, len(names), name)
+            columns, rows = TABLES[name](asked.episodes)
+            left = [k for k, column in enumerate(columns) if k == 0 or column == "why"]
+            text = markdown_table(columns, rows, left)
+            with replacing(asked.out / f"{name}.md") as path:
+                path.write_text(text, encoding="utf-8")
+            print(text)
+    return 0
+
+
+if __name__ == "__main__":
+    assert set(COSTLY) == set(named_scenarios()), "a scenario without its reference point"
+    sys.exit(main())

@@ -1,0 +1,49 @@
+"""How near a tracker comes to the least error that its reports allow."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from wsn_env.evaluation import rollout
+from wsn_env.evaluation.policies import Policy, make_policy
+from wsn_env.scenario import Scenario
+from wsn_env.simulation.bound import Bound
+from wsn_env.simulation.world import World
+
+
+class BoundedError(NamedTuple):
+    """A policy's error with the scenario's tracker, beside the bound [m]."""
+
+    rms_m: float
+    stderr_m: float  # standard error of rms_m over the episodes
+    bound_m: float  # no tracker's root mean square error is lower
+
+
+def error_bound(policy: Policy | str, scenario: Scenario, episodes: int = 1000, seed: int = 0) -> BoundedError:
+    """Play a policy and bound the error of any tracker with its reports (`simulation/bound.py`).
+
+    Args:
+        policy: or its name.
+        scenario: one that `has_bound`: motion="free", start="known", search=False.
+        episodes: the bound's expectations are means over them.
+        seed: which episodes, as of `evaluate`.
+
+    Raises:
+        ValueError: where the scenario has no bound.
+    """
+    policy = make_policy(policy, scenario) if isinstance(policy, str) else policy
+    world, seeds = World(scenario), rollout.evaluation_seeds(seed, episodes)
+    bound, squares = Bound(scenario, world.threads), []
+    for first in range(0, episodes, rollout.BLOCK):
+        block = seeds[first : first + rollout.BLOCK]
+        square = np.zeros(len(block))
+        for state, outcome in rollout.episodes(policy, world, block, lambda state, _: bound.begin(state)):
+            bound.advance(state, outcome)
+            square += outcome.error_m**2 / scenario.periods
+        squares.append(square)
+    square = np.concatenate(squares)
+    rms = float(np.sqrt(square.mean()))
+    error = float(square.std(ddof=1) / np.sqrt(len(square)) / (2 * rms)) if len(square) > 1 else float("nan")
+    return BoundedError(rms, error, bound.rms_m())
