@@ -1,5 +1,5 @@
-"""Pre-DC: prediction-based dynamic clustering (Xiang & Guo, 2013), its Table 2 and Figs. 1 and 3-8 beside ours."""
+"""Pre-DC: prediction-based dynamic clustering (Xiang & Guo, 2013), its Table 2 and Figs. 1-8 beside ours."""
 
-from wsn_env.papers.pre_dc.rebuild import reproduce, same_tracker, table2
+from wsn_env.papers.pre_dc.rebuild import reproduce
 
-__all__ = ["reproduce", "same_tracker", "table2"]
+__all__ = ["reproduce"]

@@ -1,4 +1,4 @@
-"""Figs. 1 and 3-8 of Xiang & Guo (2013): what each shows, as CSV and as a picture."""
+"""The figures of Xiang & Guo (2013) and its eqs. 2-3: what each shows, as CSV and as a picture."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import numpy as np
 
 from wsn_env.envs.rendering.colours import BLACK, BLUE, DARK, GREEN, GREY, VERMILION
 from wsn_env.models.detection.radius import Detection
+from wsn_env.papers.pre_dc.cluster import draw_cluster, list_cluster, play_until
+from wsn_env.papers.pre_dc.flow_chart import draw_flow_chart
 from wsn_env.papers.pre_dc.systems import MOTIONS, PARTICLES, SYSTEMS, Results
 from wsn_env.papers.rollout import standard_error
 from wsn_env.papers.sheet import Sheet, by_period, new_axes, tidy, write_sheet
@@ -23,7 +25,8 @@ if TYPE_CHECKING:
 STATIC, EKF, PRE_DC = VERMILION, BLUE, BLACK
 LOOKS: dict[str, tuple[str, dict[str, Any]]] = {  # system: label, style of its line
     "static": ("static-cluster", dict(color=STATIC, linestyle="--")),
-    "ekf": ("EKF, 2 nodes", dict(color=EKF, linestyle="-.")),
+    "ekf": ("EKF, 2 nodes, q = 0.03 (fitted)", dict(color=EKF, linestyle="-.")),
+    "ekf_same_q": ("EKF, 2 nodes, q = 0.02", dict(color=GREEN, linestyle=":")),
     "pre_dc": ("Pre-DC", dict(color=PRE_DC, linestyle="-")),
 }
 TRACKS: dict[str, tuple[str, dict[str, Any]]] = {
@@ -36,9 +39,10 @@ TRACKS: dict[str, tuple[str, dict[str, Any]]] = {
 
 def write_figures(out: Path, results: Results) -> None:
     """Every figure's CSV and PNG."""
-    detection = Detection()
+    detection, situation = Detection(), play_until(SYSTEMS["pre_dc"].trial(225, 1))
     sheets = {
-        "fig1": detection_curve(detection),
+        "detection": detection_curve(detection),
+        "fig1": list_cluster(situation),
         "fig3": error_per_period(results),
         "fig4": energy_per_period(results),
         "fig5": tracks(results),
@@ -47,7 +51,9 @@ def write_figures(out: Path, results: Results) -> None:
         "fig8": error_of_particles(results, 1),
     }
     pictures = {
-        "fig1": draw_detection(sheets["fig1"], detection),
+        "detection": draw_detection(sheets["detection"], detection),
+        "fig1": draw_cluster(situation),
+        "fig2": draw_flow_chart(),
         "fig3": draw_error(sheets["fig3"]),
         "fig4": draw_energy(sheets["fig4"]),
         "fig5": draw_tracks(results),
@@ -57,21 +63,22 @@ def write_figures(out: Path, results: Results) -> None:
     }
     for name, sheet in sheets.items():
         write_sheet(out / f"{name}.csv", sheet)
-        write_picture(out / f"{name}.png", pictures[name])
+    for name, picture in pictures.items():
+        write_picture(out / f"{name}.png", picture)
 
 
 # --- figures as tables --------------------------------------------------------------------------------------
 
 
 def detection_curve(detection: Detection) -> Sheet:
-    """Fig. 1: p(d) of eqs. 2-3."""
+    """Eqs. 2-3: p(d)."""
     distance = np.linspace(0.0, 15.0, 151)
     p = detection_probability(distance, Scenario(detection=detection))
     return Sheet(("distance_m", "probability"), list(zip(distance, p, strict=True)))
 
 
 def error_per_period(results: Results) -> Sheet:
-    """Fig. 3: RMS over the runs in each period, of the systems of Table 2 at 225 nodes."""
+    """Fig. 3: RMS over the runs in each period, of the systems at 225 nodes."""
     columns = [results.system(name).rms_per_period_m(SYSTEMS[name].heard_only) for name in LOOKS]
     return by_period([f"{name}_rms_m" for name in LOOKS], columns)
 
@@ -113,8 +120,8 @@ def error_of_particles(results: Results, axis: int) -> Sheet:
 
 
 def draw_detection(sheet: Sheet, detection: Detection) -> Figure:
-    """Fig. 1."""
-    title = "Fig. 1 (our reading): probability of detection, eqs. 2-3"
+    """Eqs. 2-3."""
+    title = "Eqs. 2-3: probability of detection"
     figure, axes = new_axes(title, "distance d to the target [m]", "p(d)")
     distance, p = map(np.array, zip(*sheet.rows, strict=True))
     axes.plot(distance, p, color=PRE_DC)
@@ -141,7 +148,7 @@ def draw_energy(sheet: Sheet) -> Figure:
     )
     looks = {
         "static": ("static-cluster, reports only", LOOKS["static"][1]),
-        "ekf": LOOKS["ekf"],
+        "ekf": ("EKF, 2 nodes", LOOKS["ekf"][1]),
         "pre_dc": LOOKS["pre_dc"],
     }
     kept = Sheet(sheet.columns[:2] + sheet.columns[3:], [(*row[:2], *row[3:]) for row in sheet.rows])
@@ -196,5 +203,5 @@ def _lines(axes: Axes, sheet: Sheet, looks: dict[str, tuple[str, dict[str, Any]]
     time, *columns = (np.array(column, dtype=float) for column in zip(*sheet.rows, strict=True))
     for values, (label, style) in zip(columns, looks.values(), strict=True):
         axes.plot(time, values, label=label, linewidth=1.5, **style)
-    axes.set(xlim=(0, time[-1] + 1), ylim=(0, 1.25 * np.nanmax(columns)))
-    axes.legend(frameon=False, ncols=len(looks), loc="upper center")
+    axes.set(xlim=(0, time[-1] + 1), ylim=(0, 1.3 * np.nanmax(columns)))
+    axes.legend(frameon=False, ncols=2, loc="upper center")

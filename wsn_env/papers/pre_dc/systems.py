@@ -24,6 +24,17 @@ READING: dict[str, Any] = dict(
 )
 PARTICLES = (10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000)
 MOTIONS = ("straight", "sine", "circle", "turns")
+FILTERS: dict[str, dict[str, Any]] = {  # of Figs. 5-6: what each changes in the reading
+    "fitting": dict(filter_q=None, search=True),  # the q that fits the motion, and a search for lost tracks
+    "curves": dict(filter_q=0.2, search=True),  # the q that fits the curved ones: on the straight one
+    "as read": {},
+}
+FOLLOWED = (  # track and filter
+    *(("straight", tracking) for tracking in FILTERS),
+    *((motion, tracking) for motion in MOTIONS[1:] for tracking in ("fitting", "as read")),
+)
+LIFETIME: dict[str, Any] = FILTERS["fitting"] | dict(motion="waypoint", battery_j=0.001, periods=2000, particles=500)
+LIFETIME_POLICIES = ("static_cluster", "pre_dc")
 SAME_TRACKER: dict[str, tuple[tuple[str, float], ...]] = {
     "pre_dc": (),
     "centroid": (),
@@ -48,9 +59,12 @@ class System:
         return Trial(self.policy, scenario, runs * self.runs_factor, self.parameters)
 
 
+NEAREST_LEADS = (("hysteresis_m", 0.0),)
 SYSTEMS = {
     "static": System("all", changes=(("tracker", "snapshot"),), runs_factor=3, heard_only=True),
-    "ekf": System("nearest1", (("hysteresis_m", 0.0),), (("tracker", "ekf"), ("filter_q", 0.03))),
+    "ekf": System("nearest1", NEAREST_LEADS, (("tracker", "ekf"), ("filter_q", 0.03))),
+    "ekf_same_q": System("nearest1", NEAREST_LEADS, (("tracker", "ekf"),)),
+    "ekf_three": System("nearest2", NEAREST_LEADS, (("tracker", "ekf"),)),
     "pre_dc": System("pre_dc"),
     "pre_dc_joint": System("pre_dc", changes=(("fusion", "joint"),)),
 }
@@ -76,15 +90,14 @@ def particle_trial(particles: int, runs: int) -> Trial:
     return Trial("pre_dc", scenario_as_read(particles=particles), runs)
 
 
-def motion_trial(motion: str, runs: int, fitting: bool = True) -> Trial:
-    """Pre-DC on a track (Figs. 5-6).
+def motion_trial(motion: str, runs: int, tracking: str = "fitting") -> Trial:
+    """Pre-DC on a track (Figs. 5-6), with one of FILTERS."""
+    return Trial("pre_dc", scenario_as_read(motion=motion, **FILTERS[tracking]), runs)
 
-    Args:
-        fitting: with the q that fits the motion and a search for lost tracks; else as Table 2 is read, with
-            q = 0.02 and no search.
-    """
-    changes = dict(filter_q=None, search=True) if fitting else {}
-    return Trial("pre_dc", scenario_as_read(motion=motion, **changes), runs)
+
+def lifetime_trial(policy: str, runs: int) -> Trial:
+    """A policy with the common tracker and small batteries, until they are empty."""
+    return Trial(policy, scenario_as_read(**LIFETIME), runs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,16 +127,21 @@ class Results:
         """Pre-DC with so many particles."""
         return self.records[particle_trial(count, self.runs)]
 
-    def motion(self, name: str, fitting: bool = True) -> Record:
-        """Pre-DC on a track."""
-        return self.records[motion_trial(name, self.runs, fitting)]
+    def motion(self, name: str, tracking: str = "fitting") -> Record:
+        """Pre-DC on a track, with one of FILTERS."""
+        return self.records[motion_trial(name, self.runs, tracking)]
+
+    def lifetime(self, policy: str) -> Record:
+        """A policy until the batteries are empty."""
+        return self.records[lifetime_trial(policy, self.runs)]
 
 
 def play_paper(runs: int, progress: Progress) -> Results:
     """Play everything; trials that several tables share are played once."""
     trials = [system.trial(nodes, runs) for nodes in NODES for system in SYSTEMS.values()]
     trials += [same_tracker_trial(policy, nodes, runs) for nodes in NODES for policy in SAME_TRACKER]
-    trials += [motion_trial(motion, runs, fitting) for motion in MOTIONS for fitting in (True, False)]
+    trials += [motion_trial(motion, runs, tracking) for motion, tracking in FOLLOWED]
     trials += [as_printed_trial(runs)]
     trials += [particle_trial(count, runs) for count in PARTICLES]
+    trials += [lifetime_trial(policy, runs) for policy in LIFETIME_POLICIES]
     return Results(runs, play_all(trials, progress))
