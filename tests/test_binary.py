@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from wsn_env import Cluster, Scenario, View, World
+from wsn_env.models.detection.base import known_radius
+from wsn_env.models.detection.unequal import own_radius
 from wsn_env.models.measurement.base import AtHead, node_at, weigh, weigh_period
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.models.state import state_at
@@ -134,6 +136,64 @@ def test_misread_states():
     assert abs(np.mean(misread) - 0.05) < 4 * (0.05 * 0.95 / n) ** 0.5
     again = np.mean(np.array(misread)[1:] & np.array(misread)[:-1])
     assert abs(again - 0.05**2) < 4 * (0.05**2 / n) ** 0.5
+
+
+# --- radii that differ --------------------------------------------------------------------------------------
+
+
+@numba.njit
+def _radii(cs, own, known):
+    for number in range(len(own)):
+        own[number], known[number] = own_radius(cs[0].detection, number), known_radius(cs[0].detection, number)
+
+
+def radii_of(scenario):
+    """(S,) m: within which each node senses, and what its tracker takes that for."""
+    own, known = np.empty((2, scenario.field.nodes))
+    _radii(constants(scenario), own, known)
+    return own, known
+
+
+def unequal(radius_spread, **overrides):
+    return scene(detection="unequal", radius_spread=radius_spread, **overrides)
+
+
+def test_every_node_senses_within_a_radius_of_its_own_the_same_in_every_episode():
+    scenario = unequal(0.5, nodes=400)
+    radii_m, mean_m = radii_of(scenario)
+    assert (mean_m == 40).all() and radii_m.min() >= 20 and radii_m.max() <= 60
+    uniform = np.sort(radii_m - 20) / 40  # Kolmogorov and Smirnov's distance
+    assert abs(uniform - (np.arange(400) + 0.5) / 400).max() < 1.9 / 400**0.5
+    for key in (1, 2):
+        for _, state, _ in play(scenario, key=key):
+            offset = state.network.positions[0] - state.track[0, state.period[0], ::2]
+            np.testing.assert_array_equal(state.sensed[0], np.hypot(*offset.T) <= radii_m)
+
+
+def test_trackers_know_the_radii_or_take_the_mean():
+    own, known = radii_of(unequal(0.5, radii_known=True))
+    np.testing.assert_array_equal(own, known)
+    np.testing.assert_array_equal(own, radii_of(unequal(0.5))[0])
+
+
+@pytest.mark.parametrize("tracker", ["boundary_raw", "boundary_mid", "boundary_ekf", "particle"])
+@pytest.mark.parametrize("known", [True, False])
+def test_radii_without_a_spread_are_equal(tracker, known):
+    more = dict(nodes=300, tracker=tracker)
+    disc = scene(softness=1e-9, ceiling=1.0, **more)
+    for (_, one, _), (_, other, _) in zip(play(disc), play(unequal(0.0, radii_known=known, **more)), strict=True):
+        np.testing.assert_array_equal(one.belief.mean, other.belief.mean)
+
+
+@pytest.mark.parametrize("tracker", ["boundary_raw", "boundary_mid", "boundary_ekf", "particle"])
+def test_who_knows_the_radii_errs_less(tracker):
+    """In the median: some fixes are almost singular."""
+    errors = [
+        np.median([outcome.error_m for key in range(5) for *_, outcome in play(unequal(0.3, **more), key=key)])
+        for known in (True, False)
+        for more in (dict(nodes=600, particles=500, tracker=tracker, radii_known=known),)
+    ]
+    assert errors[0] < errors[1]
 
 
 # --- what it costs ------------------------------------------------------------------------------------------
@@ -283,6 +343,9 @@ def test_who_sleeps_or_is_dead_tells_nothing():
             "reports = 'presence': allowed is 'ch",
         ),
         (dict(measurement="binary", silent_information=True), "silent_information = True: allowed is False"),
+        (dict(detection="unequal", radii_known=True), "radii_known = True: allowed is False with Position reports"),
+        (dict(detection="unequal", radius_spread=1.0), "radius_spread = 1.0: must be .* at least 0 and below 1"),
+        (dict(detection="unequal", radii_known=2), "radii_known = 2: allowed are True, False"),
         (dict(measurement="binary", gate_m=0), "Tracking.gate_m = 0: must be a finite number above 0"),
     ],
 )

@@ -74,6 +74,7 @@ def test_the_information_of_a_level_that_is_heard_above_a_threshold(distance):
         (dict(motion="free", search=False, start="search"), False),
         (dict(search=False), False),
         (dict(motion="free", search=False, measurement="binary"), False),
+        (dict(motion="free", search=False, detection="unequal"), False),
     ],
 )
 def test_only_where_its_suppositions_hold(overrides, there):

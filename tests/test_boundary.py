@@ -14,8 +14,9 @@ G = np.array([[T * T / 2, 0], [T, 0], [0, T * T / 2], [0, T]])
 Q = 0.1**2 * G @ G.T
 
 
-def centre(points):
-    return circle_centre(np.asarray(points, float), np.arange(len(points)))
+def centre(points, radii_m=None):
+    radii_m = np.full(len(points), R) if radii_m is None else radii_m
+    return circle_centre(np.asarray(points, float), np.arange(len(points)), radii_m)
 
 
 def scene(**overrides):
@@ -43,6 +44,14 @@ def test_a_fix_is_exact_where_nodes_stand_on_a_circle(n):
     angle = np.random.default_rng(n).uniform(0, 2 * np.pi, n)
     x, y, condition, _ = centre(np.array([123.0, 45.0]) + 60 * np.stack([np.cos(angle), np.sin(angle)], axis=1))
     assert (x, y) == pytest.approx((123, 45), abs=1e-8) and 1 <= condition < np.inf
+
+
+def test_a_fix_is_exact_where_nodes_stand_at_radii_of_their_own_that_are_known():
+    rng = np.random.default_rng(5)
+    angle, radii_m = rng.uniform(0, 2 * np.pi, 9), rng.uniform(40, 80, 9)
+    points = np.array([123.0, 45.0]) + radii_m[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    assert centre(points, radii_m)[:2] == pytest.approx((123, 45), abs=1e-8)
+    assert np.hypot(*(np.array(centre(points)[:2]) - (123, 45))) > 1
 
 
 @pytest.mark.parametrize("n", [4, 7, 25])

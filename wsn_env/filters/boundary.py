@@ -27,6 +27,7 @@ import numpy as np
 from wsn_env.compiled.kernels import kernel, lean_piece, over_rows
 from wsn_env.filters.base import MomentTracker
 from wsn_env.filters.least_squares import SINGULAR, circle_centre, scalar_update
+from wsn_env.models.detection.base import known_radius
 from wsn_env.models.field import squared_distance
 from wsn_env.models.state import Belief, Network, Reports, network_at, reports_at
 from wsn_env.scenario import Scenario
@@ -65,6 +66,7 @@ class Boundary(NamedTuple):
     """A period's boundary nodes."""
 
     nodes: np.ndarray  # (n,) that stand close enough to the circle
+    radii_m: np.ndarray  # (n,) within which they sense
     reported: int  # how many there were in all
 
 
@@ -124,18 +126,18 @@ def correct_rows(
         handles: of network and reports.
     """
     network, reports, (variant, at_rest) = network_at(handles[0]), reports_at(handles[1]), how
-    room = np.empty(network.battery.shape[1], np.int32)
+    room = np.empty(network.battery.shape[1], np.int32), np.empty(network.battery.shape[1])
     for b in range(start, stop):
         correct_row(beliefs[b], network, reports, b, (variant, at_rest and periods[b] == 1), room, cs[0])
 
 
 @lean_piece
-def correct_row(belief: Any, network: Any, reports: Any, b: int, how: Any, room: np.ndarray, c: Any) -> None:
+def correct_row(belief: Any, network: Any, reports: Any, b: int, how: Any, room: Any, c: Any) -> None:
     """One period of row b.
 
     Args:
         how: the variant; whether the filter starts here.
-        room: (S,) int32 for boundary nodes.
+        room: (S,) int32 and (S,) for boundary nodes and their radii.
     """
     variant, starts = how
     nodes = Nodes(network.positions[b], network.battery[b], network.row[b], network.members[b], reports.bitmap[b])
@@ -143,7 +145,7 @@ def correct_row(belief: Any, network: Any, reports: Any, b: int, how: Any, room:
     circle = expect_circle(belief, nodes, c)
     boundary = list_boundary(circle, nodes, reports, b, room, c)
     if variant == RANGES:
-        update_by_ranges(belief, nodes.positions, boundary.nodes, c)
+        update_by_ranges(belief, nodes.positions, boundary, c)
         return
     fix = locate(belief.mean, nodes, boundary, circle, variant, c)
     if fix.spread[0] != 0.0:
@@ -183,7 +185,7 @@ def expect_circle(belief: Any, nodes: Nodes, c: Any) -> Circle:
 
 
 @lean_piece
-def list_boundary(circle: Circle, nodes: Nodes, reports: Any, b: int, room: np.ndarray, c: Any) -> Boundary:
+def list_boundary(circle: Circle, nodes: Nodes, reports: Any, b: int, room: Any, c: Any) -> Boundary:
     """The boundary nodes of row b, in `room`."""
     n, reported = 0, 0
     for k in range(reports.count[b]):
@@ -191,10 +193,11 @@ def list_boundary(circle: Circle, nodes: Nodes, reports: Any, b: int, room: np.n
         if changed != 0.0:
             reported += 1
             distance = np.sqrt(squared_distance(nodes.positions, node, circle.x, circle.y))
-            if abs(distance - c.radius_m) <= circle.tolerance_m:
-                room[n] = node
+            radius_m = known_radius(c.detection, node)
+            if abs(distance - radius_m) <= circle.tolerance_m:
+                room[0][n], room[1][n] = node, radius_m
                 n += 1
-    return Boundary(room[:n], reported)
+    return Boundary(room[0][:n], room[1][:n], reported)
 
 
 @lean_piece
@@ -225,7 +228,7 @@ def locate(mean: np.ndarray, nodes: Nodes, boundary: Boundary, circle: Circle, v
     if variant < CENTROID:
         refused = boundary.reported > len(boundary.nodes)
         if len(boundary.nodes) >= FEWEST:
-            x, y, condition, inverse = circle_centre(nodes.positions, boundary.nodes)
+            x, y, condition, inverse = circle_centre(nodes.positions, boundary.nodes, boundary.radii_m)
             if condition <= (WELL_CONDITIONED if variant == MIDPOINT else SINGULAR):
                 if np.sqrt((x - circle.x) ** 2 + (y - circle.y) ** 2) <= circle.tolerance_m:
                     way = (mean[1] ** 2 + mean[3] ** 2) * c.period_s**2
@@ -269,7 +272,7 @@ def _stand_at(x, y, spread, mean, cov):
 
 
 @lean_piece
-def update_by_ranges(belief: Any, positions: np.ndarray, nodes: np.ndarray, c: Any) -> None:
+def update_by_ranges(belief: Any, positions: np.ndarray, boundary: Boundary, c: Any) -> None:
     """Extended Kalman update with 0 = |x - v T / 2 - p_i| - R for each boundary node i, linearised twice.
 
     The instant of the crossing is uniform in the period, so that the range errs by (v.u T)^2 / 12, u its direction;
@@ -282,7 +285,7 @@ def update_by_ranges(belief: Any, positions: np.ndarray, nodes: np.ndarray, c: A
         about = mean[0], mean[1], mean[2], mean[3]  # where it is linearised
         x, y = middle(mean, c)
         take_prediction(belief)  # every pass starts from the prediction: a report counts once
-        for node in nodes:
+        for node, radius_m in zip(boundary.nodes, boundary.radii_m):
             dx, dy = x - positions[node, 0], y - positions[node, 1]
             distance = np.sqrt(dx * dx + dy * dy)
             ux, uy = dx / max(distance, 1e-9), dy / max(distance, 1e-9)
@@ -291,4 +294,4 @@ def update_by_ranges(belief: Any, positions: np.ndarray, nodes: np.ndarray, c: A
             for i in range(4):
                 moved += h[i] * (mean[i] - about[i])
             radial = (ux * about[1] + uy * about[3]) * c.period_s
-            scalar_update(mean, cov, h, c.radius_m - distance - moved, radial * radial / 12.0 + floor)
+            scalar_update(mean, cov, h, radius_m - distance - moved, radial * radial / 12.0 + floor)

@@ -35,16 +35,19 @@ def _times(cov, i, h):
 
 
 @lean_piece
-def circle_centre(positions: np.ndarray, nodes: np.ndarray) -> tuple[Any, ...]:
-    """Least-squares centre of a circle of unknown radius through nodes: eqs. 3-8 over all pairs.
+def circle_centre(positions: np.ndarray, nodes: np.ndarray, radii_m: np.ndarray) -> tuple[Any, ...]:
+    """Least-squares centre of circles of these radii about nodes: eqs. 3-8 over all pairs.
 
-        x = 1/2 M^-1 sum (p_i - pbar) (|p_i|^2 - mean |p|^2),  M = sum (p_i - pbar) (p_i - pbar)'
+        x = 1/2 M^-1 sum (p_i - pbar) (|p_i|^2 - R_i^2),  M = sum (p_i - pbar) (p_i - pbar)'
+
+    What all R_i^2 have in common drops out: equal radii need not be known.
 
     Differs from the paper only in form: this is the solution of its equations over all pairs, in one sum over nodes.
 
     Args:
         positions: (S, 2) m.
         nodes: (n,) which, n > 0.
+        radii_m: (n,) R of each.
 
     Returns: x, y [m], the condition number of eq. 5's matrix, and the entries xx, xy, yy of M^-1 [1/m^2]; in a line the
         mean of the nodes, inf and zeros.
@@ -54,13 +57,14 @@ def circle_centre(positions: np.ndarray, nodes: np.ndarray) -> tuple[Any, ...]:
         x += positions[node, 0] / len(nodes)
         y += positions[node, 1] / len(nodes)
     xx, xy, yy, u, v = 0.0, 0.0, 0.0, 0.0, 0.0
-    for node in nodes:
-        dx, dy = positions[node, 0] - x, positions[node, 1] - y
+    for i in range(len(nodes)):
+        dx, dy = positions[nodes[i], 0] - x, positions[nodes[i], 1] - y
+        square = dx * dx + dy * dy - (radii_m[i] * radii_m[i] - radii_m[0] * radii_m[0])
         xx += dx * dx
         xy += dx * dy
         yy += dy * dy
-        u += dx * (dx * dx + dy * dy)
-        v += dy * (dx * dx + dy * dy)
+        u += dx * square
+        v += dy * square
     determinant = xx * yy - xy * xy
     largest = 0.5 * (xx + yy) + np.sqrt(0.25 * (xx - yy) ** 2 + xy * xy)
     if determinant * SINGULAR**2 <= largest * largest:

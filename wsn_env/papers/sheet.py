@@ -8,11 +8,11 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from math import floor, isfinite, log10
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from rich.markup import escape
 from rich.table import Table
 
@@ -102,7 +102,10 @@ def show_table(
 
 
 def show_sheet(path: Path, title: str, sheet: Sheet, caption: str | None = None) -> None:
-    """The same of a sheet, numbers with four digits; a column `stderr_...` in brackets behind the one before it."""
+    """The same of a sheet, numbers with four digits; a column `stderr_...` in brackets behind the one before it.
+
+    A figure with a standard error has as many decimals as that has with two digits.
+    """
     shown = [i for i, name in enumerate(sheet.columns) if not name.startswith("stderr")]
     rows = []
     for row in sheet.rows:
@@ -115,7 +118,7 @@ def _shown(value: Any, error: float | None) -> str:
     """For people: four digits, or as many as a standard error of two digits leaves."""
     if value is None:
         return "-"
-    if error and np.isfinite(error):
-        digits = max(0, 1 - int(np.floor(np.log10(error))))
+    if error and isfinite(error):
+        digits = max(0, 1 - floor(log10(error)))
         return f"{value:.{digits}f} ({error:.{digits}f})"
     return f"{value:.4g}" if isinstance(value, float) else str(value)

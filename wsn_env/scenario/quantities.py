@@ -72,6 +72,8 @@ class Quantities(TypedDict, total=False):
     decay_power: float
     edge_power: float
     threshold_db: float
+    radius_spread: float
+    radii_known: bool
     # measurements
     at_1m_db: float | tuple[float, ...]
     exponents: float | tuple[float, ...]

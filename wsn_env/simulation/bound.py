@@ -12,7 +12,7 @@ episodes played. An estimator knows the first belief, so that the mean may be ta
 
 It is a bound where the recursion's suppositions are the world's, and only there (`has_bound`): tracks of nearly
 constant velocity from a normal start, never redrawn or reflected; a start known with an error N(0, P0); no search,
-whose choice of a head tells of strengths; reports whose errors are independent. J(0) is the information of P0 and
+whose choice of a head tells of strengths; reports whose errors are independent, and nodes that detect by a law with a slope. J(0) is the information of P0 and
 of the start's own covariance together. A lost report counts as if it had arrived: its sender's battery may tell of it
 later.
 """
@@ -34,7 +34,8 @@ def has_bound(scenario: Scenario) -> bool:
     """Whether the suppositions of the bound are the scenario's."""
     tracking, motion = scenario.tracking, scenario.motion
     own_law = motion.start_sds is not None and motion.process_noise_ms2 is not None
-    return scenario.measurement.independent and own_law and tracking.start == "known" and not tracking.search
+    reports = scenario.measurement.independent and scenario.detection.regular
+    return reports and own_law and tracking.start == "known" and not tracking.search
 
 
 class Bound:

@@ -41,8 +41,11 @@ class DetectionRule(Kind):
         "weigh_detection",
         "weigh_silence",
         "information",
+        "known_radius",
     )
 
+    regular: ClassVar[bool] | property = True  # whether p(d) has a slope everywhere and every period draws anew, as the
+    # bound supposes
     values_decide: ClassVar[bool] = False  # whether the measured value decides, so that detecting tells of the value
 
     def check(self, scenario: Scenario) -> None:
@@ -86,6 +89,11 @@ class DetectionRule(Kind):
         return draws.uniform(stream, node.number) < probability(d, m, np.sqrt(dx * dx + dy * dy))
 
     @staticmethod
+    def known_radius(d: Any, number: int) -> float:
+        """The sensing radius of a node as a tracker of binary sensors knows it [m]; here all have the same."""
+        return d.radius_m
+
+    @staticmethod
     def weigh_detection(d: Any, m: Any, x: np.ndarray, log_weights: np.ndarray, node: Any) -> None:
         """Add to every particle the log probability that the node, which reported, detects a target there."""
         for i in range(x.shape[1]):
@@ -127,6 +135,7 @@ def probability(d: Any, m: Any, distance: float) -> Any:
 mean_probability: Any = by_kind(DetectionRule.mean_probability)
 stream_of: Any = by_kind(DetectionRule.stream_of)
 detects: Any = by_kind(DetectionRule.detects)
+known_radius: Any = by_kind(DetectionRule.known_radius)
 weigh_detection: Any = by_kind(DetectionRule.weigh_detection)
 weigh_silence: Any = by_kind(DetectionRule.weigh_silence)
 information: Any = by_kind(DetectionRule.information)

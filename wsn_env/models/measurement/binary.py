@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import F, exp, exp32, log32, normal_cdf
 from wsn_env.compiled.kernels import lean_piece
-from wsn_env.models.detection.base import detects, stream_of
+from wsn_env.models.detection.base import detects, known_radius, stream_of
 from wsn_env.models.measurement.base import (
     AtHead,
     Line,
@@ -19,7 +19,6 @@ from wsn_env.models.measurement.base import (
     Occasion,
     Order,
     PositionBelief,
-    node_at,
     tells,
 )
 from wsn_env.models.quantity import ScenarioError, quantity
@@ -28,6 +27,14 @@ if TYPE_CHECKING:
     from wsn_env.scenario import Scenario
 
 TWO_PI = 6.283185307179586
+
+
+class Disc(NamedTuple):
+    """Where a node detects."""
+
+    x: float  # m
+    y: float
+    radius_m: float
 
 
 @dataclass(frozen=True)
@@ -146,7 +153,7 @@ class Binary(Measurement):
     @staticmethod
     def weigh(m: Any, px: np.ndarray, py: np.ndarray, log_weights: np.ndarray, node: Any, value: Any) -> None:
         """One reported state."""
-        _weigh_state(px, py, log_weights, node, value[0] != 0.0, m.flip, m)
+        _weigh_state(px, py, log_weights, Disc(node.x, node.y, m.radius_m), value[0] != 0.0, m.flip, m)
 
     @staticmethod
     def weigh_period(m: Any, head: AtHead, c: Any, maps: np.ndarray, scratch: Any) -> None:
@@ -166,12 +173,13 @@ class Binary(Measurement):
         for k in range(-1, standing.n_members):
             number = standing.head if k < 0 else network.members[b, k]
             nearest, farthest = _reach(positions[number], box)
-            if battery[number] > 0.0 and nearest < m.radius_m + far and farthest > m.radius_m - far:
+            radius = known_radius(c.detection, number)
+            if battery[number] > 0.0 and nearest < radius + far and farthest > radius - far:
                 wrong = max(m.flip, 1.0 - m.delivery)
                 for other in nodes:
                     wrong = m.flip if other == number else wrong
-                node = node_at(positions, number)
-                _weigh_state(x[0], x[2], log_weights, node, bitmap[number] != 0, wrong, m)
+                disc = Disc(positions[number, 0], positions[number, 1], radius)
+                _weigh_state(x[0], x[2], log_weights, disc, bitmap[number] != 0, wrong, m)
 
 
 @lean_piece
@@ -194,7 +202,7 @@ def _reach(position, box):
 
 
 @lean_piece
-def _weigh_state(px, py, log_weights, node, detects, wrong, m):
+def _weigh_state(px, py, log_weights, disc, detects, wrong, m):
     """Add to every particle the log probability of the state of a binary sensor.
 
     P(1) = f + (1 - 2 f) l2 / (1 + exp((d - R) / s)), s the softness of the edge and l2 the ceiling of detection.
@@ -202,12 +210,12 @@ def _weigh_state(px, py, log_weights, node, detects, wrong, m):
     Args:
         wrong: f, the probability that the bitmap is wrong: by a misreading, or by a change whose report was lost.
     """
-    sx, sy = F(node.x), F(node.y)
+    sx, sy = F(disc.x), F(disc.y)
     wrong = min(max(wrong, 1e-6), 0.5)  # no state rules a particle out
     rest = F((1.0 - 2.0 * wrong) * m.ceiling)
     least = F(wrong if detects else wrong + (1.0 - 2.0 * wrong) * (1.0 - m.ceiling))
     slope = F((-1.0 if detects else 1.0) / m.edge_m)
-    radius = F(m.radius_m)
+    radius = F(disc.radius_m)
     for i in range(len(px)):
         dx = px[i] - sx
         dy = py[i] - sy

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 from wsn_env.compiled import draws
 from wsn_env.evaluation.rollout import FIRST_SEED
-from wsn_env.papers.binary.systems import SIDE_M, VELOCITY_MS, Setting
+from wsn_env.papers.binary.systems import SIDE_M, SYSTEMS, VELOCITY_MS, Setting
 from wsn_env.simulation.world import World
 
 V = np.array(VELOCITY_MS)
@@ -48,6 +48,13 @@ def boundary_nodes(nodes: int = 600, radius_m: float = 60.0, period_s: float = 1
     """Expected number of nodes that change their state in a period: 2 rho (pi R^2 - lens(|v| T))."""
     way = np.hypot(*V) * period_s
     return 2 * nodes / SIDE_M**2 * (np.pi * radius_m**2 - lens_m2(way, radius_m))
+
+
+def transmitting_nodes(setting: Setting) -> float:
+    """Expected number of nodes that transmit in a period, in closed form."""
+    if SYSTEMS[setting.system].reports == "presence":
+        return detecting_nodes(setting.nodes, setting.radius_m)
+    return boundary_nodes(setting.nodes, setting.radius_m, setting.period_s)
 
 
 def even_period_s(radius_m: float = 60.0) -> float:

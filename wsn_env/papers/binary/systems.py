@@ -1,18 +1,20 @@
-"""The systems of Zhou, Cheng & Xing (2009) as trials, and everything that is played for the paper."""
+"""The systems of Zhou, Cheng & Xing (2009) as trials: everything that is played for the paper."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from math import floor
+from math import floor, pi
 from typing import Any, Literal
 
 import numpy as np
 
-from wsn_env.evaluation.progress import Progress
+from wsn_env.models.detection.base import DetectionRule
 from wsn_env.models.detection.radius import Detection
+from wsn_env.models.detection.unequal import UnequalRadii
 from wsn_env.models.measurement.binary import Binary
 from wsn_env.models.motion.legs import Legs
-from wsn_env.papers.rollout import Record, Trial, play_all
+from wsn_env.papers.rollout import Trial
 from wsn_env.scenario import Scenario
 
 NODES = (400, 500, 600, 700, 800)
@@ -24,6 +26,7 @@ STEADY_S = (15.0, 40.0)  # the target is well inside the field
 INSIDE_S = 7.0  # a system that starts inside begins when the whole disc has entered
 FLIP, GATE_M, SUCCESS = 0.001, 20.0, 0.7  # the faults, and the gate against them
 REFRESHES = (0, 10, 5)
+SPREADS = (0.1, 0.2)  # half width of unequal radii, in R
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,7 @@ SYSTEMS = {
     "centroid_rls": System("centroid_rls", reports="presence"),
 }
 SWEPT = ("raw", "paper", "mid", "ekf", "centroid")
+UNEQUAL = ("raw", "paper", "mid", "ekf", "particle")
 FAULTED = ("raw", "paper", "paper_inside", "mid", "ekf", "particle", "centroid")
 
 
@@ -64,6 +68,8 @@ class Setting:
     gate_m: float | None = None
     success: float = 1.0  # of a single try; reports that are lost stay lost
     refresh: int = 0
+    spread: float = 0.0  # of the nodes' radii, in R
+    knows: Literal["R", "the spread", "each radius"] = "R"  # what the tracker knows of them
 
     @property
     def begin_s(self) -> float:
@@ -92,8 +98,9 @@ class Setting:
             nodes=self.nodes,
             side_m=SIDE_M,
             motion=Legs(start_m=start_m, legs=((left_s, *VELOCITY_MS),)),
-            detection=Detection(radius_m=self.radius_m, softness=1e-6, ceiling=1.0),
+            detection=self._detection(),
             measurement=Binary("changes" if faulty else system.reports, refresh=self.refresh, flip=self.flip),
+            edge_m=self.spread * self.radius_m / pi if self.knows == "the spread" else 1.0,  # of the radii's variance
             packet_success=self.success,
             retries=0,
             tracker=system.tracker,
@@ -105,61 +112,29 @@ class Setting:
         )
         return Trial("all", Scenario.named("Binary-v0", **(values | dict(system.tracking))), runs)
 
+    def _detection(self) -> DetectionRule:
+        if self.spread == 0:
+            return Detection(radius_m=self.radius_m, softness=1e-6, ceiling=1.0)
+        return UnequalRadii(self.radius_m, self.spread, self.knows == "each radius")
+
+
+def vary(system: str, field: str, values: Iterable[float]) -> list[Setting]:
+    """A system's settings over a quantity, a field of them."""
+    changes: list[dict[str, Any]] = [{field: value} for value in values]
+    return [Setting(system, **change) for change in changes]
+
 
 SETTINGS = (
     *(Setting(name) for name in SYSTEMS),
-    *(Setting(name, nodes=n) for n in NODES for name in SWEPT),
-    *(Setting(name, radius_m=r) for r in RADII_M for name in SWEPT),
-    *(Setting(name, period_s=t) for t in PERIODS_S for name in (*SWEPT, "paper_inside")),
+    *(one for name in SWEPT for one in vary(name, "nodes", NODES)),
+    *(one for name in SWEPT for one in vary(name, "radius_m", RADII_M)),
+    *(one for name in (*SWEPT, "paper_inside") for one in vary(name, "period_s", PERIODS_S)),
 )
 FAULTS = (
     *(Setting(name, flip=FLIP, gate_m=gate) for gate in (None, GATE_M) for name in FAULTED),
     *(Setting(name, success=SUCCESS, refresh=refresh) for refresh in REFRESHES for name in FAULTED),
 )
-
-
-@dataclass(frozen=True, eq=False)
-class Results:
-    """Everything that was played for the paper."""
-
-    runs: int
-    records: dict[Setting, Record]
-
-    def error_m(self, setting: Setting) -> np.ndarray:
-        """(R, K') error in each steady period."""
-        return np.sqrt(self.records[setting].square_error()[:, setting.steady])
-
-    def run_error_m(self, setting: Setting) -> np.ndarray:
-        """(R,) mean error of each run."""
-        return self.error_m(setting).mean(axis=1)
-
-    def rms_m(self, setting: Setting) -> float:
-        """Root of the mean square error over runs and periods."""
-        return float(np.sqrt((self.error_m(setting) ** 2).mean()))
-
-    def reporting(self, setting: Setting) -> np.ndarray:
-        """(R,) mean number of nodes that report in a period (ANTNP) of each run."""
-        return self.records[setting].detections[:, setting.steady].mean(axis=1)
-
-    def energy_mj(self, setting: Setting) -> np.ndarray:
-        """(R,) mean energy of a period of each run."""
-        return self.records[setting].energy_mj[:, setting.steady].mean(axis=1)
-
-    def rms_by_period_s(self, system: str) -> np.ndarray:
-        """RMS of a system for each of PERIODS_S [m]."""
-        return np.array([self.rms_m(Setting(system, period_s=t)) for t in PERIODS_S])
-
-    def crossing_s(self, system: str) -> float:
-        """The sampling period from which the centroid has the lower RMS, interpolated; NaN: none up to the longest."""
-        excess = self.rms_by_period_s(system) - self.rms_by_period_s("centroid")
-        for k in np.flatnonzero((excess[:-1] < 0) & (excess[1:] >= 0)):
-            share = excess[k] / (excess[k] - excess[k + 1])
-            return float(PERIODS_S[k] + share * (PERIODS_S[k + 1] - PERIODS_S[k]))
-        return float("nan")
-
-
-def play_paper(runs: int, progress: Progress) -> Results:
-    """Play everything; what several tables share is played once."""
-    trials = {setting: setting.trial(runs) for setting in (*SETTINGS, *FAULTS)}
-    records = play_all(trials.values(), progress)
-    return Results(runs, {setting: records[trial] for setting, trial in trials.items()})
+RADII = (
+    *(Setting(name, spread=s, knows=knows) for s in SPREADS for knows in ("R", "each radius") for name in UNEQUAL),
+    *(Setting("particle", spread=s, knows="the spread") for s in SPREADS),
+)
