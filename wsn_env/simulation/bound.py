@@ -12,9 +12,9 @@ episodes played. An estimator knows the first belief, so that the mean may be ta
 
 It is a bound where the recursion's suppositions are the world's, and only there (`has_bound`): tracks of nearly
 constant velocity from a normal start, never redrawn or reflected; a start known with an error N(0, P0); no search,
-whose choice of a head tells of strengths; reports whose errors are independent, and nodes that detect by a law with a slope. J(0) is the information of P0 and
-of the start's own covariance together. A lost report counts as if it had arrived: its sender's battery may tell of it
-later.
+whose choice of a head tells of strengths; reports whose errors are independent, of nodes that detect by a law with a
+slope. J(0) is the information of P0 and of the start's own covariance together. A lost report counts as if it had
+arrived: its sender's battery may tell of it later.
 """
 
 from __future__ import annotations
