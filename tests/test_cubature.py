@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 from filterpy.kalman import CubatureKalmanFilter, KalmanFilter
+from scipy.linalg import sqrtm
 
 from tests.anchors import RING, everyone, play_subsets, ring_scenario, tell
 from wsn_env import Scenario, World
+from wsn_env.compiled.kernels import kernel
 from wsn_env.filters.cubature import ITERATIONS, TOLERANCE_M, CKFTracker, ICKFTracker
-from wsn_env.filters.kalman import constant_velocity
+from wsn_env.filters.kalman import UKFTracker, constant_velocity
+from wsn_env.filters.root import symmetric_root
 from wsn_env.models.state import State
 
 NODES = np.array(RING, float)
@@ -25,7 +28,7 @@ def textbook(x, p, transition, noise, nodes, z, iterations, variance):
     x, p = transition @ x, transition @ p @ transition.T + noise
     at, spread = x, p
     for _ in range(iterations):
-        root = 2 * np.linalg.cholesky(spread).T
+        root = 2 * sqrtm(spread).real
         points = np.concatenate([at + root, at - root])
         values = strengths(points[:, ::2], nodes)
         level = values.mean(axis=0)
@@ -91,13 +94,13 @@ def test_filterpys_cubature_filter_is_near():
         assert 0 < np.linalg.norm((state.belief.mean[0] - other.x[:, 0])[::2]) < 1.5
 
 
-def corrected(tracker, mean, cov, values, times=1):
+def corrected(tracker, mean, cov, values, times=1, nodes=NODES):
     """Beliefs of as many rows after one period; `times` counts the measurement more than once."""
     scenario = ring_scenario(filter_q=0.0)
     rows = len(values)
     state = State.zeros(rows=rows, nodes=8)
     state.belief.mean[:], state.belief.cov[:] = mean, cov
-    state.network.positions[:] = NODES
+    state.network.positions[:] = nodes
     state.reports.count[:], state.reports.node[:], state.reports.value[:, :, 0] = 8, np.arange(8), values
     for i in range(times):
         if i > 0:  # undo the prediction
@@ -159,3 +162,33 @@ def test_a_belief_without_doubt_stays_as_it_is(tracker):
     belief = corrected(tracker, mean, np.zeros((4, 4)), strengths(np.array([[50.0, 100]]), NODES))
     np.testing.assert_allclose(belief.mean[0], [60.5, 1, 111, 2], atol=1e-9)
     assert np.abs(belief.cov[0]).max() < 1e-20
+
+
+SWAPPED = [2, 3, 0, 1]  # y, vy, x, vx
+
+
+@pytest.mark.parametrize("tracker", [CKFTracker, ICKFTracker, UKFTracker])
+def test_swapped_axes_give_the_swapped_belief(tracker):
+    """Points along the columns of Cholesky's factor depend on the order of the axes: metres here."""
+    rng = np.random.default_rng(2)
+    draw = rng.normal(size=(50, 4, 4)) * np.array([20.0, 4, 20, 4])[:, None]
+    mean, cov = rng.uniform(20, 180, (50, 4)) * (1, 0.05, 1, 0.05), draw @ np.swapaxes(draw, 1, 2)
+    values = strengths(mean[:, ::2], NODES) + rng.normal(0, 3, (50, 8))
+    one = corrected(tracker, mean, cov, values)
+    other = corrected(tracker, mean[:, SWAPPED], cov[:, SWAPPED][:, :, SWAPPED], values, nodes=NODES[:, ::-1])
+    np.testing.assert_allclose(other.mean[:, SWAPPED], one.mean, rtol=1e-7, atol=1e-6)
+    np.testing.assert_allclose(other.cov[:, SWAPPED][:, :, SWAPPED], one.cov, rtol=1e-7, atol=1e-5)
+
+
+root_and_inverse = kernel(lambda cov, root, inverse: symmetric_root(cov, root, inverse))
+
+
+@pytest.mark.parametrize("variances", [(9.0, 4, 1, 1), (1e4, 1e-6, 25, 3), (5.0, 5, 5, 5), (7.0, 2, 0, 0)])
+def test_the_root_is_symmetric_and_its_square_the_covariance(variances):
+    basis = np.linalg.qr(np.random.default_rng(4).normal(size=(4, 4)))[0]
+    cov = (basis * variances) @ basis.T
+    cov, root, inverse = 0.5 * (cov + cov.T), np.empty((4, 4)), np.empty((4, 4))
+    root_and_inverse(cov, root, inverse)
+    np.testing.assert_array_equal(root, root.T)
+    np.testing.assert_allclose(root @ root, cov, atol=1e-12 * max(variances))
+    np.testing.assert_allclose(inverse @ root, np.eye(4), atol=1e-5)

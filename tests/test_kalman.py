@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
+from scipy.linalg import sqrtm
 
 from tests.anchors import play_subsets, ring_scenario, tell
 from wsn_env import Scenario, View, World, make_policy
@@ -86,7 +87,7 @@ def test_the_unscented_filter_is_filterpys():
     """With all reports of a period as one measurement, whichever anchors they come from."""
     scenario = ring_scenario(tracker="ukf", start_sd_m=10.0, start_sd_ms=3.0)
     transition, noise = constant_velocity(scenario)
-    points = MerweScaledSigmaPoints(4, 0.1, 2.0, -1.0)
+    points = MerweScaledSigmaPoints(4, 0.1, 2.0, -1.0, sqrt_method=lambda cov: sqrtm(cov).real)
     oracle = UnscentedKalmanFilter(4, 8, 0.5, None, lambda x, dt: transition @ x, points)
     oracle.Q = noise
     for k, state in enumerate(play_subsets(scenario, [5])):

@@ -1,17 +1,19 @@
 """The cubature Kalman filter and its iterated form; Gaussian integrals by 2n points, n = 4.
 
-Arasaratnam & Haykin (2009): the mean of f over N(x, P) is that of f at x +- sqrt(n) l_j, l_j the columns of a square
-root of P. A measurement z = h(x) + noise is replaced by its best linear fit over the belief (statistical linear
-regression), z = H x + b + residual of covariance W + noise. The iterated form fits again about the belief just found
-(posterior linearisation; Garcia-Fernandez, Svensson, Morelande & Sarkka, 2015), and always corrects the *prior*: to
-correct the posterior once more would count the measurement twice. A linear measurement fits at once: both are then
-the Kalman filter.
+Arasaratnam & Haykin (2009): the mean of f over N(x, P) is that of f at x +- sqrt(n) s_j, s_j the columns of a square
+root of P: here the symmetric one, since points along the columns of Cholesky's depend on the order of the axes. A
+measurement z = h(x) + noise is replaced by its best linear fit over the belief (statistical linear regression),
+z = H x + b + residual of covariance W + noise. The iterated form fits again about the belief just found (posterior
+linearisation; Garcia-Fernandez, Svensson, Morelande & Sarkka, 2015), and always corrects the *prior*: to correct the
+posterior once more would count the measurement twice. A linear measurement fits at once: both are then the Kalman
+filter.
 """
 
 import numpy as np
 
 from wsn_env.compiled.kernels import kernel, over_rows, piece
 from wsn_env.filters.base import MomentTracker
+from wsn_env.filters.root import symmetric_root
 from wsn_env.models.measurement.base import at_point, linearise, node_at, unwrap
 from wsn_env.models.motion.prediction import predict_moments
 from wsn_env.models.state import Belief, Network, Reports, network_at, reports_at
@@ -117,25 +119,28 @@ def _expect(state, positions, nodes, about, c, out):
 def _fit(mean, cov, positions, nodes, about, c):
     """Statistical linear regression of h over N(mean, cov), for m measured values.
 
-    With L the root of cov, z+_j and z-_j the values at mean +- 2 l_j, and D_j = (z+_j - z-_j) / 4, the covariance of
-    state and values is L D, so that H = (cov^-1 L D)' solves H L = D'.
+    With S the symmetric root of cov, z+_j and z-_j the values at mean +- 2 s_j, and D_j = (z+_j - z-_j) / 4, the
+    covariance of state and values is S D, so that H = (cov^-1 S D)' = D' S^-1.
 
     Returns: H (m, 4); the mean value (m,); the residual's covariance (m, m): that of the values less H cov H' = D' D.
     """
     size = len(about)
-    root = cov.copy()
-    _factor(root)
+    root, inverse = np.empty((4, 4)), np.empty((4, 4))
+    symmetric_root(cov, root, inverse)
     values = np.empty((8, size))
     for j in range(4):
-        _expect(mean + 2.0 * root[:, j], positions, nodes, about, c, values[2 * j])
-        _expect(mean - 2.0 * root[:, j], positions, nodes, about, c, values[2 * j + 1])
+        _expect(mean + 2.0 * root[j], positions, nodes, about, c, values[2 * j])
+        _expect(mean - 2.0 * root[j], positions, nodes, about, c, values[2 * j + 1])
     level = np.zeros(size)
     for k in range(8):
         level += values[k] / 8.0
-    slope = np.empty((size, 4))
+    cross, slope = np.empty((size, 4)), np.zeros((size, 4))  # D' and H
     for i in range(size):
         for j in range(4):
-            slope[i, j] = 0.25 * (values[2 * j, i] - values[2 * j + 1, i])
+            cross[i, j] = 0.25 * (values[2 * j, i] - values[2 * j + 1, i])
+        for j in range(4):
+            for k in range(4):
+                slope[i, j] += cross[i, k] * inverse[k, j]
     residual = np.empty((size, size))
     for i in range(size):
         for k in range(i + 1):
@@ -143,13 +148,8 @@ def _fit(mean, cov, positions, nodes, about, c):
             for j in range(8):
                 total += (values[j, i] - level[i]) * (values[j, k] - level[k]) / 8.0
             for j in range(4):
-                total -= slope[i, j] * slope[k, j]
+                total -= cross[i, j] * cross[k, j]
             residual[i, k] = residual[k, i] = total
-    for i in range(size):  # H from D', from the last column on
-        for j in range(3, -1, -1):
-            for k in range(j + 1, 4):
-                slope[i, j] -= slope[i, k] * root[k, j]
-            slope[i, j] /= root[j, j]
     return slope, level, residual
 
 

@@ -132,13 +132,12 @@ class UKFTracker(FilterpyTracker):
 
 
 def square_root(cov: np.ndarray) -> np.ndarray:
-    """U with U' U = cov, for any n; directions of negative variance are flattened."""
-    cov = 0.5 * (cov + cov.T)
-    try:
-        return np.linalg.cholesky(cov).T
-    except np.linalg.LinAlgError:
-        variances, directions = np.linalg.eigh(cov)
-        return np.sqrt(np.maximum(variances, 0.0))[:, None] * directions.T
+    """The symmetric S with S S = cov, for any n; directions of negative variance are flattened.
+
+    Unlike Cholesky's factor it does not depend on the order of the axes, nor do points spread along its columns.
+    """
+    variances, directions = np.linalg.eigh(0.5 * (cov + cov.T))
+    return (directions * np.sqrt(np.maximum(variances, 0.0))) @ directions.T
 
 
 POSITION_ROWS = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0]])
