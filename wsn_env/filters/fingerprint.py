@@ -49,14 +49,14 @@ class FingerprintMap:
         return cls(points, strengths, (offset**2).sum(axis=-1) < reach_m**2)
 
     def distances(self, nodes: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """Squared distance of each point's fingerprint to strengths (n,) heard by some nodes (n,), over those nodes.
+        """Squared distance of each point's fingerprint to strengths (..., n) that nodes (n,) heard, over those nodes.
 
         Points where fewer of the nodes could hear the target than elsewhere are out of the question.
 
-        Returns: (G,), inf at those points.
+        Returns: (..., G), inf at those points.
         """
         audible = self.audible[:, nodes].sum(axis=1)
-        squared = ((self.strengths[:, nodes] - values) ** 2).sum(axis=1)
+        squared = ((self.strengths[:, nodes] - values[..., None, :]) ** 2).sum(axis=-1)
         return np.where(audible == audible.max(), squared, np.inf)
 
 
@@ -87,6 +87,10 @@ class FingerprintNetwork:
         offset = self.map.points - fix
         return fix, (offset.T * _weigh(distances, self.noise)) @ offset + self.cell_m2 * np.eye(2)
 
+    def fixes(self, nodes: np.ndarray, strengths: np.ndarray) -> np.ndarray:
+        """(..., 2) m: the fixes that `locate` finds, of strengths (..., n) that the same nodes (n,) have heard."""
+        return _weigh(self.map.distances(nodes, strengths), self.width) @ self.map.points
+
 
 def _weigh(distances, width: float) -> np.ndarray:
     """Weights (..., G) that sum to 1, from squared distances (..., G)."""
@@ -109,8 +113,8 @@ class Training:
         sample = FingerprintMap.survey(anywhere, nodes, model, reach_m, 1, rng)
         heard = [v for v in range(VALIDATION) if sample.audible[v].any()]
         self.points: np.ndarray = anywhere[heard]
-        self._distances = np.empty((len(heard), len(grid)))
-        for row, v in zip(self._distances, heard, strict=True):
+        self.distances: np.ndarray = np.empty((len(heard), len(grid)))  # squared, point by point of the map
+        for row, v in zip(self.distances, heard, strict=True):
             nodes_heard = np.flatnonzero(sample.audible[v])
             row[:] = self.map.distances(nodes_heard, sample.strengths[v, nodes_heard])
         self._cell_m2, self._noise, self._seed = line[1] ** 2 / 12, model.noise, seed
@@ -119,7 +123,7 @@ class Training:
 
     def error(self, width: float) -> float:
         """Root mean square error of the fixes at the validation points [m]."""
-        offset = _weigh(self._distances, width) @ self.map.points - self.points
+        offset = _weigh(self.distances, width) @ self.map.points - self.points
         return float(np.sqrt((offset**2).sum(axis=1).mean()))
 
     def best_width(self, search: str) -> tuple[float, float, int]:

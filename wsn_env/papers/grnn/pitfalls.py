@@ -14,6 +14,7 @@ from wsn_env.filters.kalman import constant_velocity
 from wsn_env.filters.linear import LinearModel
 from wsn_env.models.field import fixed_positions
 from wsn_env.papers.grnn.systems import NOISE_DB, scenario_as_read, track
+from wsn_env.papers.rollout import pooled_rms
 from wsn_env.papers.sheet import Sheet
 from wsn_env.scenario import Scenario
 
@@ -34,8 +35,7 @@ def pitfalls(runs: int) -> Sheet:
 
     def fixes(network: FingerprintNetwork, points: np.ndarray) -> np.ndarray:
         heard = model.expected(points, nodes) + rng.normal(0.0, NOISE_DB, (runs, len(points), len(nodes)))
-        located = [network.locate(np.arange(len(nodes)), strengths)[0] for strengths in heard.reshape(-1, len(nodes))]
-        return np.reshape(located, (runs, len(points), 2))
+        return np.stack([network.fixes(np.arange(len(nodes)), strengths) for strengths in heard])
 
     same = fixes(honest, truth)
     cases = {
@@ -45,8 +45,8 @@ def pitfalls(runs: int) -> Sheet:
         "the same on the mirrored path": fixes(cheat, mirrored) - mirrored,
         "network trained on a grid, on the mirrored path": fixes(honest, mirrored) - mirrored,
     }
-    rows = [(name, float(np.sqrt((offset**2).sum(axis=-1).mean()))) for name, offset in cases.items()]
-    return Sheet(("evaluation", "rmse_m"), rows)
+    rows = [(name, *pooled_rms((offset**2).sum(axis=-1))) for name, offset in cases.items()]
+    return Sheet(("evaluation", "RMSE m", "stderr_m"), rows)
 
 
 def _reset(fixes: np.ndarray, states: np.ndarray, scenario: Scenario) -> np.ndarray:

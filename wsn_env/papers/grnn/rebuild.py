@@ -3,14 +3,16 @@
 A target that carries a node is located from the strength of signals between it and eight anchors. A general regression
 network (Specht, 1991) turns strengths into a position; fruit fly optimisation (Pan, 2012) chooses its width; a cubature
 Kalman filter with a constant velocity follows, iterated or not. Beside it stand linear least squares (eq. 9), nonlinear
-least squares, and the extended, unscented, cubature and iterated cubature filters on the strengths themselves.
+least squares, nearest fingerprints, and on the strengths themselves the extended, unscented, cubature and iterated
+cubature filters and a particle filter.
 
 The text's figures are lost for the greater part, so the numbers are our reading: a field of 200 m x 200 m; eight
 anchors on its border (ring8) or four corners and four inside (mix8), all heard everywhere; strength -40 - 30 lg d dB,
 noise 3 dB a sample; 50 s from (20, 15) m at (10, 5), (2, 6), (-8, 2), (-3, -9) m/s for 12.5 s each; filters with white
 acceleration of 3 m^2/s^3 (here constant within a period, with sd sqrt(3 / T) m/s^2: the same but for T^3/4 m^2 in the
 position); a map of 441 points, 10 m apart, each the mean of 10 samples, and 400 random points to choose the width by.
-A filter begins with the network's fix of its first period, at rest with a sd of 10 m/s.
+A filter begins with the network's fix of its first period, at rest with a sd of 10 m/s. "ICKF" on the strengths does
+so, too, and therefore is not without the network: beside it stands one begun in the field's middle.
 
 **The combination** is GRNN + KF: the network's fixes are positions, and for these a cubature filter, iterated or not,
 is the Kalman filter. As noise it takes the spread of the fix on the map. Against the filters on the strengths
@@ -31,25 +33,17 @@ from __future__ import annotations
 from pathlib import Path
 
 from wsn_env.evaluation.progress import Progress, progress_bar
-from wsn_env.filters.fingerprint import training_of
 from wsn_env.papers.claim import write_and_print_claims
 from wsn_env.papers.coverage import write_coverage
-from wsn_env.papers.grnn import figures
-from wsn_env.papers.grnn.claims import EXPECTED_RMSE_M, judge_claims, list_expectations
+from wsn_env.papers.grnn import figures, tables
+from wsn_env.papers.grnn.claims import judge_claims, list_expectations
+from wsn_env.papers.grnn.comparison import compare, errors_of_methods
 from wsn_env.papers.grnn.coverage import COVERAGE
 from wsn_env.papers.grnn.pitfalls import pitfalls
-from wsn_env.papers.grnn.systems import (
-    ANCHORS,
-    EQUAL_INFORMATION,
-    METHODS,
-    PERIODS_S,
-    STARTED,
-    STARTS,
-    Results,
-    play_paper,
-    scenario_as_read,
-)
-from wsn_env.papers.sheet import Sheet, prepare_folder, show_sheet, show_table, write_sheet
+from wsn_env.papers.grnn.strengths import listen
+from wsn_env.papers.grnn.systems import COMPARED_S, PERIODS_S, play_paper
+from wsn_env.papers.grnn.targets import many_targets
+from wsn_env.papers.sheet import Sheet, prepare_folder, write_sheet
 
 
 def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
@@ -57,69 +51,41 @@ def reproduce(out: Path, runs: int, progress: Progress | None = None) -> None:
     prepare_folder(out)
     with progress_bar(progress) as show:
         results = play_paper(runs, show)
-    widths = {search: training_of(scenario_as_read("grnn")).best_width(search) for search in ("golden", "foa")}
+    heard = {period_s: listen(period_s, runs) for period_s in PERIODS_S}
+    compared, searches = errors_of_methods(results, heard[COMPARED_S]), tables.widths(runs)
     sheets = {
-        "rmse": rmse(results),
-        "equal_information": equal_information(results),
-        "poor_start": poor_start(results),
-        "width": Sheet(
-            ("search", "width_db", "validation_rmse_m", "evaluations"), [(name, *w) for name, w in widths.items()]
-        ),
-        "bound": Sheet(("anchors", "static_bound_m"), list(results.bound_m.items())),
+        "errors": tables.errors(results),
+        "equal_information": tables.equal_information(results),
+        "poor_start": tables.poor_start(results),
+        "iteration": tables.iteration(results),
+        "smoothing": tables.smoothing(heard),
+        "comparison": compare(compared),
+        "width": tables.width_table(searches),
+        "bound": Sheet(("anchors", "bound of one period m"), list(results.bound_m.items())),
         "pitfalls": pitfalls(runs),
+        "targets": many_targets(),
     }
     for name, sheet in sheets.items():
         write_sheet(out / f"{name}.csv", sheet)
-    figures.write_figures(out, results)
-    claims, expectations = judge_claims(results, widths), list_expectations(results, widths)
+    figures.write_figures(out, results, heard[COMPARED_S], compared)
     _show_tables(out, sheets, runs)
     write_coverage(out / "coverage.md", COVERAGE)
-    write_and_print_claims(out, claims, expectations)
-
-
-def rmse(results: Results) -> Sheet:
-    """The main table: root mean square error over all runs and periods, radial and along each axis."""
-    rows = []
-    for method, expectations in EXPECTED_RMSE_M.items():
-        for period_s, expected_m in zip(PERIODS_S, expectations, strict=True):
-            record = results.method(method, period_s)
-            along = [record.pooled_rms_m(axis)[0] for axis in (0, 1)]
-            rows.append((method, period_s, expected_m, *record.pooled_rms_m(), *along))
-    return Sheet(("method", "period_s", "expected_m", "rmse_m", "stderr_m", "rmse_x_m", "rmse_y_m"), rows)
-
-
-def equal_information(results: Results) -> Sheet:
-    """The same with noise sqrt(1 s / T) dB."""
-    cases = [(method, t) for method in EQUAL_INFORMATION for t in PERIODS_S]
-    rows = [(method, t, t**-0.5, *results.equal_information(method, t).pooled_rms_m()) for method, t in cases]
-    return Sheet(("method", "period_s", "noise_db", "rmse_m", "stderr_m"), rows)
-
-
-def poor_start(results: Results) -> Sheet:
-    """The first 5 s at T = .5 s and 0.5 dB, from the middle of the field and from a fix."""
-    cases = [(anchors, start, method) for anchors in ANCHORS for start in STARTS for method in STARTED]
-    rows = [(a, start, method, *results.start(method, a, start).pooled_rms_m()) for a, start, method in cases]
-    return Sheet(("anchors", "start", "method", "rmse_m", "stderr_m"), rows)
+    expectations = list_expectations(results, searches, compared)
+    write_and_print_claims(out, judge_claims(results, searches), expectations)
 
 
 def _show_tables(out: Path, sheets: dict[str, Sheet], runs: int) -> None:
-    rows = []
-    for method in METHODS:
-        cells = [row for row in sheets["rmse"].rows if row[0] == method]
-        rows.append([METHODS[method]] + [f"{row[3]:.2f} ({row[4]:.2f})" for row in cells])
-    caption = f"ring8, 3 dB; RMSE [m] (standard error), {runs} runs"
-    show_table(
-        out / "rmse.md",
-        "Error against sampling period",
-        ("method", *(f"T = {t:g} s" for t in PERIODS_S)),
-        rows,
-        caption,
-    )
+    tables.show_errors(out, sheets["errors"], runs)
+    tables.show_equal_information(out, sheets["equal_information"])
+    tables.show_poor_start(out, sheets["poor_start"])
+    tables.show_smoothing(out, sheets["smoothing"])
     titles = {
-        "equal_information": "At an equal information rate",
-        "poor_start": "The first 5 s",
+        "iteration": "Iteration with a fix to begin with, 3 dB",
+        "comparison": "Methods compared, T = 0.5 s",
         "width": "Width of the network",
-        "pitfalls": "How not to evaluate",
+        "bound": "Static Cramer-Rao bound, root mean square along the path",
+        "pitfalls": "How not to evaluate, T = 1 s",
+        "targets": "Many targets, T = 0.5 s, the first 2.5 s",
     }
     for name, title in titles.items():
-        show_sheet(out / f"{name}.md", title, sheets[name])
+        tables.show_measured(out / f"{name}.md", title, sheets[name])

@@ -21,8 +21,8 @@ from wsn_env.simulation.world import World
 
 PERIODS_S = (0.1, 0.2, 0.5, 1.0)
 METHODS = {  # tracker: what it is called
-    "trilateration": "least squares",
-    "nonlinear_ls": "nonlinear LS",
+    "trilateration": "least squares (eq. 9)",
+    "nonlinear_ls": "nonlinear least squares",
     "grnn": "GRNN",
     "grnn_kf": "GRNN + KF",
     "ekf": "EKF",
@@ -42,6 +42,7 @@ PATH = Legs(start_m=(20.0, 15.0), legs=((12.5, 10, 5), (12.5, 2, 6), (12.5, -8, 
 LENGTH_S, POOR_START_S = 50.0, 5.0
 DENSITY = 3.0  # m^2/s^3, the filters' white acceleration
 NOISE_DB, PRECISE_DB = 3.0, 0.5
+COMPARED_S, PARTICLES = 0.5, 20_000
 
 
 def scenario_as_read(tracker: str, period_s: float = 0.5, noise_db: float = NOISE_DB, **changes: object) -> Scenario:
@@ -80,6 +81,16 @@ def start_trial(method: str, anchors: str, start: str, runs: int) -> Trial:
     periods = round(POOR_START_S / 0.5)
     scenario = scenario_as_read(method, noise_db=PRECISE_DB, positions=ANCHORS[anchors], start=start, periods=periods)
     return Trial("all", scenario, runs)
+
+
+def unaided_trial(period_s: float, runs: int) -> Trial:
+    """ICKF alone: on the strengths, from the middle of the field and at rest, without the network's fix."""
+    return Trial("all", scenario_as_read("ickf", period_s, start="field"), runs)
+
+
+def particle_trial(runs: int) -> Trial:
+    """A particle filter on the strengths, from anywhere in the field."""
+    return Trial("all", scenario_as_read("particle", COMPARED_S, start="field", particles=PARTICLES), runs)
 
 
 def track(period_s: float) -> np.ndarray:
@@ -121,6 +132,15 @@ class Results:
         """The first seconds."""
         return self.records[start_trial(method, anchors, start, self.runs)]
 
+    def unaided(self, period_s: float) -> Record:
+        """ICKF from the middle of the field."""
+        return self.records[unaided_trial(period_s, self.runs)]
+
+    @property
+    def particle(self) -> Record:
+        """The particle filter."""
+        return self.records[particle_trial(self.runs)]
+
     @cached_property
     def bound_m(self) -> dict[str, float]:
         """Root mean square of the static Cramer-Rao bound along the path, by anchors."""
@@ -133,4 +153,5 @@ def play_paper(runs: int, progress: Progress) -> Results:
     trials = [method_trial(method, t, runs) for t in PERIODS_S for method in METHODS]
     trials += [equal_information_trial(method, t, runs) for t in PERIODS_S for method in EQUAL_INFORMATION]
     trials += [start_trial(method, *case, runs) for case in product(ANCHORS, STARTS) for method in STARTED]
+    trials += [unaided_trial(t, runs) for t in PERIODS_S] + [particle_trial(runs)]
     return Results(runs, play_all(trials, progress))
