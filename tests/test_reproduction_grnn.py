@@ -13,7 +13,13 @@ from tests.figures import check_tables
 from wsn_env.papers import reproduce
 from wsn_env.papers.claim import HOLDS, NOT_REPRODUCED, UNDER_READING
 from wsn_env.papers.coverage import State
-from wsn_env.papers.grnn.claims import EXPECTED_EQUAL_INFORMATION_M, EXPECTED_POOR_START_M, EXPECTED_RMSE_M
+from wsn_env.papers.grnn.claims import (
+    EXPECTED_EQUAL_INFORMATION_M,
+    EXPECTED_POOR_START_M,
+    EXPECTED_RMSE_M,
+    excess,
+    mean_excess,
+)
 from wsn_env.papers.grnn.coverage import COVERAGE
 from wsn_env.papers.grnn.fixes import REFERENCES, by_network, least_squares, nearest_fingerprints
 from wsn_env.papers.grnn.flies import anchor_flies
@@ -200,6 +206,15 @@ def test_filtered_strengths_bring_the_network_nearer():
         (np.linalg.norm(by_network(s) - heard.target_m, axis=-1) ** 2).mean(axis=1) for s in (heard.strengths, filtered)
     )
     assert exceeds(raw, better)
+
+
+def test_an_excess_is_paired():
+    rng = np.random.default_rng(0)
+    ours = rng.uniform(1, 9, 400)
+    share, error = excess(ours, 1.21 * ours)
+    assert share == pytest.approx(0.1) and error < 1e-12
+    share, error = mean_excess(ours, 1.1 * ours + rng.normal(0, 0.1, 400))
+    assert abs(share - 0.1) < 4 * error and error == pytest.approx(0.1 / 20 / 5, rel=0.2)
 
 
 def test_flies_from_the_anchors_find_a_width_in_sides_and_not_in_metres():

@@ -95,9 +95,20 @@ def judge_claims(results: Results, searches: list[Search]) -> list[Claim]:
 
 
 def excess(ours: np.ndarray, theirs: np.ndarray) -> tuple[float, float]:
-    """sqrt(mean(ours) / mean(theirs)) - 1 of the runs' mean square errors (R,), and its standard error, paired."""
-    ratio = float(np.sqrt(ours.mean() / theirs.mean()))
-    return ratio - 1, standard_error(ours - ratio**2 * theirs) / (2 * ratio * float(theirs.mean()))
+    """By what share their RMSE exceeds ours, and its standard error, from the runs' mean square errors (R,); paired."""
+    ratio = float(np.sqrt(theirs.mean() / ours.mean()))
+    return ratio - 1, standard_error(theirs - ratio**2 * ours) / (2 * ratio * float(ours.mean()))
+
+
+def mean_excess(ours: np.ndarray, theirs: np.ndarray) -> tuple[float, float]:
+    """The same of the mean error, from that of the runs (R,)."""
+    ratio = float(theirs.mean() / ours.mean())
+    return ratio - 1, standard_error(theirs - ratio * ours) / float(ours.mean())
+
+
+def _run_mean(record: Record) -> np.ndarray:
+    """(R,) mean error of each run [m]."""
+    return np.sqrt(record.square_error()).mean(axis=1)
 
 
 def _run_mse(record: Record) -> np.ndarray:
@@ -148,15 +159,17 @@ def _combination(results: Results) -> Iterator[Claim]:
     }
     for part, theirs in parts.items():
         wins = [exceeds(_run_mse(b), _run_mse(a)) for a, b in zip(ours, theirs, strict=True)]
-        beyond = ", ".join(_share(b, a) for a, b in zip(ours, theirs, strict=True))
-        text = f"GRNN + KF {_row(ours)} m at T = .1, .2, .5, 1 s; the other's RMSE is beyond that by {beyond}"
+        squares = ", ".join(_percent(*excess(_run_mse(a), _run_mse(b))) for a, b in zip(ours, theirs, strict=True))
+        means = ", ".join(_percent(*mean_excess(_run_mean(a), _run_mean(b))) for a, b in zip(ours, theirs, strict=True))
+        text = (
+            f"GRNN + KF {_row(ours)} m at T = .1, .2, .5, 1 s; the other's RMSE is beyond that by {squares}, its mean"
+            f" error by {means}"
+        )
         what = f"the combination of network and filter beats {part}"
         yield Claim(what, "beats", text, judge_claim(all(wins), any(wins)))
 
 
-def _share(one: Record, other: Record) -> str:
-    """By how much one record's root mean square error exceeds another's, with its standard error; paired by run."""
-    share, error = excess(_run_mse(one), _run_mse(other))
+def _percent(share: float, error: float) -> str:
     return f"{100 * share:+.1f} ({100 * error:.1f}) %"
 
 

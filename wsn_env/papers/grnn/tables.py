@@ -119,7 +119,7 @@ def iteration(results: Results) -> Sheet:
     rows = []
     for period_s in PERIODS_S:
         ickf, ckf = (results.method(method, period_s).rms_m() ** 2 for method in ("ickf", "ckf"))
-        share, error = excess(ickf, ckf)
+        share, error = excess(ckf, ickf)
         rows.append((f"{period_s:g}", 100 * share, 100 * error))
     return Sheet(("T s", "ICKF's RMSE beyond CKF's %", "stderr_percent"), rows)
 
