@@ -8,6 +8,7 @@ import numpy as np
 
 from wsn_env.compiled.kernels import piece
 
+N = 4  # known when compiled: loops are unrolled
 SWEEPS = 30  # at most; four or five do
 ROUNDING = 1e-16  # a correlation below this counts as none
 LEAST = 1e-14  # of the largest variance: a smaller one is lost to rounding
@@ -20,22 +21,21 @@ def symmetric_root(cov, root, inverse):
     No variance in D is taken below LEAST of the largest, nor below 1e-30, so that the inverse exists.
 
     Args:
-        cov: (n, n) symmetric.
-        root, inverse: (n, n) filled.
+        cov: (4, 4) symmetric.
+        root, inverse: (4, 4) filled.
     """
-    n = len(cov)
-    left, directions = cov.copy(), np.eye(n)
+    left, directions = cov.copy(), np.eye(N)
     for _ in range(SWEEPS):
         if not _sweep(left, directions):
             break
     largest = 0.0
-    for k in range(n):
+    for k in range(N):
         largest = max(largest, left[k, k])
     root[:], inverse[:] = 0.0, 0.0
-    for k in range(n):
+    for k in range(N):
         sd = np.sqrt(max(left[k, k], LEAST * largest, 1e-30))
-        for i in range(n):
-            for j in range(n):
+        for i in range(N):
+            for j in range(N):
                 product = directions[i, k] * directions[j, k]
                 root[i, j] += sd * product
                 inverse[i, j] += product / sd
@@ -47,9 +47,9 @@ def _sweep(left, directions):
 
     Golub & Van Loan (2013), sec. 8.5: `left` approaches D, `directions` V.
     """
-    n, rotated = len(left), False
-    for p in range(n - 1):
-        for q in range(p + 1, n):
+    rotated = False
+    for p in range(N - 1):
+        for q in range(p + 1, N):
             if abs(left[p, q]) <= ROUNDING * np.sqrt(abs(left[p, p] * left[q, q])):
                 continue
             rotated = True
@@ -57,10 +57,10 @@ def _sweep(left, directions):
             tangent = (1.0 if tau >= 0 else -1.0) / (abs(tau) + np.sqrt(1.0 + tau * tau))
             cosine = 1.0 / np.sqrt(1.0 + tangent * tangent)
             sine = tangent * cosine
-            for k in range(n):
+            for k in range(N):
                 a, b = left[k, p], left[k, q]
                 left[k, p], left[k, q] = cosine * a - sine * b, sine * a + cosine * b
-            for k in range(n):
+            for k in range(N):
                 a, b = left[p, k], left[q, k]
                 left[p, k], left[q, k] = cosine * a - sine * b, sine * a + cosine * b
                 a, b = directions[k, p], directions[k, q]
