@@ -32,6 +32,8 @@ def same(a, b) -> bool:
     """Equal to the bit, through dicts and object arrays."""
     if isinstance(a, dict):
         return a.keys() == b.keys() and all(same(a[k], b[k]) for k in a)
+    if a is None or b is None:
+        return a is b
     if isinstance(a, tuple):
         return len(a) == len(b) and all(map(same, a, b))
     a, b = np.asarray(a), np.asarray(b)

@@ -26,6 +26,18 @@ def spreader(spread_copies):
 spread = spreader(resampling.spread_copies)
 
 
+def spreader_alike(spread_copies_alike):
+    @numba.njit
+    def spread(ancestors, scale, cov, x):
+        spread_copies_alike(ancestors, scale, cov, x)
+        return x
+
+    return spread
+
+
+spread_alike = spreader_alike(resampling.spread_copies_alike)
+
+
 def copies(counts):
     """Ancestors (P,) of parents that are copied so many times each."""
     return np.repeat(np.arange(len(counts), dtype=np.int32), counts)
@@ -71,6 +83,31 @@ def test_a_parents_direction_does_not_depend_on_the_others():
     alone, crowd = offsets([1, 1, 5]), offsets([4, 7, 5])
     np.testing.assert_array_equal(alone[-5:], crowd[-5:])
     assert (offsets([1, 1, 5], key=1)[-5:] != alone[-5:]).any()
+
+
+def test_a_common_spread_moves_all_parents_copies_by_the_clouds_sds():
+    counts = [1, 2, 3, 4, 7, 8]
+    ancestors = copies(counts)
+    places = spread_alike(ancestors, 0.5, COV, np.zeros((4, len(ancestors)), np.float32)).T
+    steps = places / (0.5 * np.sqrt(np.diag(COV)))
+    np.testing.assert_allclose(steps, steps[:, :1] * np.ones(4), atol=1e-6)  # parallel lines
+    for parent, n in enumerate(counts):
+        own = np.sort(steps[ancestors == parent, 0])
+        pairs = (n - 1) // 2
+        np.testing.assert_allclose(own, np.sort([*[0] * (n - 2 * pairs), *range(1, pairs + 1), *range(-pairs, 0)]))
+
+
+def test_a_filter_spreads_alike():
+    """The same copies as with systematic resampling, each moved along the sds of the cloud before."""
+    chosen = dict(particles=500, filter_q=0.0, resample_below=1, noise_m=0.5)
+    plain, alike = Filter(**chosen), Filter(**chosen, resampling="common_spread")
+    for filter in (plain, alike):
+        filter.step([(0, 49.5, 49.0)])
+    np.testing.assert_array_equal(plain.belief.mean, alike.belief.mean)
+    before, after = (f.belief.particles[0].T.astype(float) for f in (plain, alike))
+    steps = (after - before) / (0.5 * np.sqrt(np.diag(plain.belief.cov[0])))
+    np.testing.assert_allclose(steps, np.round(steps[:, :1]) * np.ones(4), atol=2e-2)
+    assert len(np.unique(np.round(steps[:, 0]))) > 2
 
 
 FLAT = [np.diag([1.0, 0, 4, 0]), np.zeros((4, 4)), np.ones((4, 4)), np.outer([1, 2, 3, 4], [1, 2, 3, 4])]
@@ -127,6 +164,9 @@ def test_fast_kernels_spread_alike():
     x = np.random.default_rng(0).normal(50, 3, (4, len(ancestors))).astype(np.float32)
     strict = spread(3, ancestors, 0.5, COV, x.copy())
     quick = spreader(fast(resampling.spread_copies))(3, ancestors, 0.5, COV, x.copy())
+    np.testing.assert_allclose(quick, strict, atol=2e-5)
+    strict = spread_alike(ancestors, 0.5, COV, x.copy())
+    quick = spreader_alike(fast(resampling.spread_copies_alike))(ancestors, 0.5, COV, x.copy())
     np.testing.assert_allclose(quick, strict, atol=2e-5)
 
 

@@ -124,7 +124,7 @@ def cloud(draw, measurement):
     """What the particle filter alone has; a bitmap tells of silence anyhow."""
     return dict(
         silent_information=measurement != "binary" and draw(st.sampled_from([False, False, True])),
-        resampling=draw(st.sampled_from(["systematic", "spread"])),
+        resampling=draw(st.sampled_from(["systematic", "spread", "common_spread"])),
         spread_scale=draw(st.sampled_from([0.5, 0.0, 3.0])),
         redraw_on_handover=draw(st.sampled_from([False, False, True])),
     )

@@ -41,7 +41,8 @@ class ClusterEnv(gym.Env):
         fast: a quicker particle filter, equal to rounding, whose bits differ from processor to processor.
         overrides: any quantity of the scenario: `nodes=400, particles=1000, lam=(0.3, 30), motion="sine"`.
 
-    An episode is truncated at the horizon and never terminates: a lost track or a dead network goes on.
+    An episode is truncated at the horizon: a lost track or a dead network goes on. It terminates only with
+    `ends_outside=True`, in the period in which the target is outside the field.
     """
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": FPS}
@@ -71,7 +72,7 @@ class ClusterEnv(gym.Env):
             self.reward_dim: int = 2
         self._state: State = None  # type: ignore[assignment]  # until the first reset
         self._view: View = None  # type: ignore[assignment]
-        self._lam, self._period = 0.0, 0
+        self._lam, self._period, self._ended = 0.0, 0, False
         self._squares = 0.0
         self._detections = 0
         self._reference = Reference(self.scenario) if has_reference(self.scenario) else None
@@ -82,7 +83,7 @@ class ClusterEnv(gym.Env):
         state = self.world.allocate(1) if self._state is None else self._state
         key = draws.episode_key(self.np_random)
         self._state, outcome = self.world.restart(state, [True], np.array([key]), donate=True)
-        self._lam, self._period = self._state.lam.item(), 0
+        self._lam, self._period, self._ended = self._state.lam.item(), 0, False
         self._squares = 0.0
         self._detections = 0
         info = self._reward_and_info(outcome)[1]
@@ -94,11 +95,11 @@ class ClusterEnv(gym.Env):
         return self._observe(), info
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """One period. Returns observation, reward, terminated (never), truncated, info."""
+        """One period. Returns observation, reward, terminated, truncated, info."""
         if self._state is None:
             raise gym.error.ResetNeeded("call reset() before step()")
-        if self._period >= self.scenario.periods:
-            raise gym.error.ResetNeeded(f"the episode ended after {self.scenario.periods} periods: call reset()")
+        if self._ended:
+            raise gym.error.ResetNeeded(f"the episode ended after {self._period} periods: call reset()")
         cluster = self.interface.action.cluster(_add_batch_axis(action), self._view)
         self._state, outcome = self.world.step(self._state, cluster, donate=True)
         reward, info = self._reward_and_info(outcome)
@@ -111,14 +112,19 @@ class ClusterEnv(gym.Env):
         if self._camera is not None:
             self._camera.add(self._state, outcome)
             self._camera.show(self._state)
+        terminated = self.scenario.ends_outside and self.world.left(self._state).item()
         truncated = self._period >= self.scenario.periods
-        if truncated:
-            info["episode_rms_m"] = math.sqrt(self._squares / self.scenario.scored)
-            info["antnp"] = self._detections / self.scenario.periods
+        self._ended = terminated or truncated
+        if self._ended:
+            info["episode_rms_m"] = math.sqrt(self._squares / (self._period - self.scenario.unscored))
+            info["antnp"] = self._detections / self._period
+            if self.scenario.ends_outside:
+                left = self.scenario.periods - self._period
+                reward, info["reward_rest"] = self.interface.charge_rest(reward, self._lam, left)
             if self._reference is not None:
                 info["episode_reference_m"] = self._reference.episode_m().item()
                 info["episode_reference_all_awake_m"] = self._reference.all_awake_m(self._state).item()
-        return self._observe(), reward, False, truncated, info
+        return self._observe(), reward, terminated, truncated, info
 
     def _reward_and_info(self, outcome: Outcome) -> tuple[float | np.ndarray, dict[str, Any]]:
         return self.interface.reward_and_info(dict(zip(_OUTCOMES, outcome.row.item())), self._lam)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from gymnasium.spaces import Box
 
 from wsn_env.envs.actions import Action, ActionName, make_action
@@ -34,8 +35,26 @@ class Interface:
         )
         self.reward_space: Box | None = reward_space(settings.reward)
         self._reward = make_reward(settings.reward)
+        self._reference = scenario.reference_error_m, scenario.reference_energy_mj
 
     def reward_and_info(self, outcome: Any, lam: Any) -> tuple[Any, dict[str, Any]]:
         """A period's reward and info, of arrays (B, ...) or of one row's numbers."""
         reward = self._reward(outcome, lam)
         return reward, period_info(outcome, lam, reward if self.reward_space is None else None)
+
+    def charge_rest(self, reward: Any, lam: Any, periods: Any) -> tuple[Any, Any]:
+        """Charge the periods that are left when an episode ends outside the field: ending must never pay.
+
+        Each costs the scenario's reference error and energy, whatever the policy, which no front's point exceeds.
+
+        Args:
+            reward: of the last period, arrays (B, ...) or one row's.
+            periods: (B,) or a number: how many are left, 0 in a row that goes on or ends at the horizon.
+
+        Returns: the reward with the charge, and the charge alone at this lam, at most 0.
+        """
+        error, energy = (each * periods for each in self._reference)
+        rest = -(error + lam * energy)
+        if self.reward_space is None:
+            return reward + rest, rest
+        return reward - np.stack([error, energy], axis=-1).astype(np.float32), rest

@@ -162,41 +162,53 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             reward[anew] = 0.0
             _overwrite_rows(info, self._restart(anew), anew)
         truncated = self._state.period >= self.scenario.periods
-        terminated = np.zeros(self.num_envs, dtype=bool)
-        ends = truncated.any()
+        terminated = self.world.left(self._state)
+        ended = terminated | truncated
+        ends = ended.any()
+        if terminated.any():
+            reward = self._charge_rest(reward, terminated)[0]
         if ends and self.autoreset_mode == AutoresetMode.SAME_STEP:
             return self._restart_within_step(reward, terminated, truncated, info)
-        self._ended = truncated.copy()
+        self._ended = ended
         self._show()
         infos = _mask_info(info)
         if ends:
-            infos |= _mask_info(self._episode_info(truncated), truncated)
+            infos |= _mask_info(self._episode_info(ended), ended)
         return self._observe(), reward, terminated, truncated, infos
 
     def _episode_info(self, rows: np.ndarray) -> dict[str, np.ndarray]:
         """What sums up an episode, of the rows that end."""
-        periods = self.scenario.periods
-        info = {"episode_rms_m": np.sqrt(self._squares / self.scenario.scored), "antnp": self._detections / periods}
+        played = np.maximum(self._state.period, 1)
+        scored = np.maximum(played - self.scenario.unscored, 1)
+        info = {"episode_rms_m": np.sqrt(self._squares / scored), "antnp": self._detections / played}
+        if self.scenario.ends_outside:
+            info["reward_rest"] = self._charge_rest(0.0, rows)[1]
         if self._reference is not None:
             info["episode_reference_m"] = self._reference.episode_m()
             info["episode_reference_all_awake_m"] = self._reference.all_awake_m(self._state, rows)
         return info
 
+    def _charge_rest(self, reward: Any, rows: np.ndarray) -> tuple[Any, np.ndarray]:
+        """The reward with what the periods cost that some rows leave out, and that cost alone."""
+        periods = np.where(rows, self.scenario.periods - self._state.period, 0)
+        return self.interface.charge_rest(reward, self._state.lam, periods)
+
     def _restart_within_step(
         self, reward: np.ndarray, terminated: np.ndarray, truncated: np.ndarray, info: dict[str, Any]
     ) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Begin the ended rows within the step; their last observation and info go to final_obs and final_info."""
+        ended = terminated | truncated
         last = self._observe()
         final = np.full(self.num_envs, None, dtype=object)
-        for i in np.flatnonzero(truncated):
+        for i in np.flatnonzero(ended):
             final[i] = {name: value[i] for name, value in last.items()} if isinstance(last, dict) else last[i]
-        infos: dict[str, Any] = {"final_obs": final, "_final_obs": truncated.copy()}
-        infos["final_info"] = _mask_info(info | self._episode_info(truncated), truncated)
-        infos["_final_info"] = truncated.copy()
-        _overwrite_rows(info, self._restart(truncated), truncated)
+        infos: dict[str, Any] = {"final_obs": final, "_final_obs": ended.copy()}
+        infos["final_info"] = _mask_info(info | self._episode_info(ended), ended)
+        infos["_final_info"] = ended.copy()
+        _overwrite_rows(info, self._restart(ended), ended)
         self._show()
         infos |= _mask_info(info)
-        return self._observe(truncated), reward, terminated, truncated, infos
+        return self._observe(ended), reward, terminated, truncated, infos
 
     @property
     def lam(self) -> np.ndarray:

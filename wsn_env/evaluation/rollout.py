@@ -67,7 +67,8 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
     Returns: the measured columns of each episode, and the sums that its return is made of. `anees` is the average
     normalised estimation error squared of the position (Bar-Shalom, Li & Kirubarajan, 2001, sec. 5.4), e' P^-1 e / 2:
     1 where the filter is honest, more where it is too sure. `variance_ratio` is the mean of e' e / trace(P), which one
-    thin direction of P cannot dominate. Both leave out the unscored periods, as `rms_m` does.
+    thin direction of P cannot dominate. Both leave out the unscored periods, as `rms_m` does. Of an episode that ends
+    outside the field all means are over the periods played, and the sums hold the charge for those left.
     """
     scenario = world.scenario
     names = "error", "square", "energy", "members", "handovers", "searches", "lost"
@@ -76,34 +77,41 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
     regular_periods, nees_sums = np.zeros(len(seeds)), np.zeros(len(seeds))
     reference = Reference(scenario, len(seeds), world.threads) if has_reference(scenario) else None
     begin = None if reference is None else lambda state, _: reference.begin(state)
+    playing, played = np.ones(len(seeds), bool), np.zeros(len(seeds), int)
     for state, outcome in episodes(policy, world, seeds, begin):
         square, believed = outcome.error_m**2, outcome.posterior_rms_m**2
-        sums["error"] += outcome.error_m
+        played += playing
+        sums["error"] += playing * outcome.error_m
         if state.period[0] > scenario.unscored:
-            sums["square"] += square
+            sums["square"] += playing * square
             nees, regular = _position_nees(state, outcome)
-            nees_sums += nees
-            regular_periods += regular
-            counted_periods += believed > 0
-            ratios += np.divide(square, believed, out=np.zeros(len(seeds)), where=believed > 0)
-        sums["energy"] += outcome.energy_mj
-        sums["members"] += outcome.members
-        sums["handovers"] += outcome.handover
-        sums["searches"] += outcome.searched
-        sums["lost"] += outcome.error_m > 2 * scenario.radius_m
+            nees_sums += playing * nees
+            regular_periods += playing & regular
+            counted_periods += playing & (believed > 0)
+            ratios += np.divide(square, believed, out=np.zeros(len(seeds)), where=playing & (believed > 0))
+        sums["energy"] += playing * outcome.energy_mj
+        sums["members"] += playing * outcome.members
+        sums["handovers"] += playing & outcome.handover
+        sums["searches"] += playing & outcome.searched
+        sums["lost"] += playing & (outcome.error_m > 2 * scenario.radius_m)
+        playing &= ~world.left(state)
         if reference is not None:
             reference.advance(state, outcome)
-    n = scenario.periods
+    left = scenario.periods - played
+    error, energy = (
+        sums["error"] + left * scenario.reference_error_m,
+        sums["energy"] + left * scenario.reference_energy_mj,
+    )
     columns = {
         "lam": state.lam,
-        "periods": np.full(len(seeds), n),
-        "return": -(sums["error"] + state.lam * sums["energy"]),
-        "sum_error_m": sums["error"],
-        "sum_energy_mj": sums["energy"],
-        "error_m": sums["error"] / n,
-        "rms_m": np.sqrt(sums["square"] / scenario.scored),
-        "energy_mj": sums["energy"] / n,
-        "members": sums["members"] / n,
+        "periods": played,
+        "return": -(error + state.lam * energy),
+        "sum_error_m": error,
+        "sum_energy_mj": energy,
+        "error_m": sums["error"] / played,
+        "rms_m": np.sqrt(sums["square"] / (played - scenario.unscored)),
+        "energy_mj": sums["energy"] / played,
+        "members": sums["members"] / played,
         "handovers": sums["handovers"].astype(int),
         "searches": sums["searches"].astype(int),
         "lost": sums["lost"].astype(int),

@@ -26,6 +26,10 @@ def score(act: Callable[[Any], Any], envs: VectorEnv, seed: int = 0) -> np.ndarr
 
     Returns: (B,).
     """
+    if unwrap_native(envs).scenario.ends_outside:
+        raise ValueError(
+            "Scenario.ends_outside = True: must be False here, where all rows end together; use `evaluate`"
+        )
     seeds: Any = evaluation_seeds(seed, envs.num_envs)  # the native environment takes a seed for each row
     observations, _ = envs.reset(seed=seeds)
     lam, periods = unwrap_native(envs).lam.copy(), unwrap_native(envs).scenario.periods

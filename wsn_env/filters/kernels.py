@@ -14,7 +14,7 @@ from wsn_env.compiled.draws import normal_pair32
 from wsn_env.compiled.elementary import F, exp32, f32_bits, f32_from_bits
 from wsn_env.compiled.kernels import kernel, lean_kernel, lean_piece, piece
 from wsn_env.filters.likelihood import weigh_awake
-from wsn_env.filters.resampling import REACH, correlated, lower_root, resample, spread_copies
+from wsn_env.filters.resampling import REACH, correlated, lower_root, resample, spread_copies, spread_copies_alike
 from wsn_env.filters.walkers import scatter_walkers, walk
 from wsn_env.models.measurement.base import AtHead, weigh_period
 from wsn_env.models.measurement.beacon_levels import draw_biases
@@ -232,7 +232,9 @@ def filter_row(key: Any, period: int, head: AtHead, c: Any, maps: np.ndarray, sc
         u = draws.uniform(draws.stream(key, period, draws.RESAMPLING), 0)
         resample(u, x, log_weights, weights, total, slots, states)
         draw_biases(belief.biases[b], slots[2, REACH:], weights)
-        if c.tracking.spread_scale > 0.0:
+        if c.tracking.spread_alike:
+            spread_copies_alike(slots[2, REACH:], c.tracking.spread_scale, row.cov, x)
+        elif c.tracking.spread_scale > 0.0:
             spread = draws.stream(key, period, draws.SPREAD)
             spread_copies(spread, slots[2, REACH:], c.tracking.spread_scale, row.cov, x)
     return resampled

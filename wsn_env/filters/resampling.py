@@ -107,7 +107,7 @@ def spread_copies(stream: Any, ancestors: np.ndarray, scale: float, cov: np.ndar
     with S = scale L u, L L' = cov and u ~ N(0, I) drawn for each parent. So 2n copies bring 2 (n - 1) new particles, as
     the patent says, and those of a parent have m (m + 1) / 3 or (m - 1)(2m - 1) / 6 times S S' about it.
 
-    Differs from the patent, which has one S for all, the sds of the components: then all copies lie on parallel lines.
+    Differs from the patent, which has one S for all: `spread_copies_alike`.
 
     Args:
         ancestors: (P,) in ascending order.
@@ -123,15 +123,40 @@ def spread_copies(stream: Any, ancestors: np.ndarray, scale: float, cov: np.ndar
             stop += 1
         pairs = (stop - start - 1) // 2
         if pairs > 0:
-            d0, d1, d2, d3 = correlated(stream, parent, root)
-            for j in range(1, pairs + 1):
-                far = size * F(j)
-                for place, side in ((stop - 2 * j, far), (stop - 2 * j + 1, -far)):
-                    x[0, place] += side * d0
-                    x[1, place] += side * d1
-                    x[2, place] += side * d2
-                    x[3, place] += side * d3
+            _set_pairs(x, stop, pairs, size, correlated(stream, parent, root))
         start = stop
+
+
+@lean_piece
+def spread_copies_alike(ancestors: np.ndarray, scale: float, cov: np.ndarray, x: np.ndarray) -> None:
+    """The same with one S for all parents, as the patent has it: scale times the sds of the four components.
+
+    All further copies of a cloud then lie on parallel lines.
+
+    Args:
+        ancestors, cov, x: as for `spread_copies`.
+    """
+    n, start, size = x.shape[1], 0, F(scale)
+    sds = F(np.sqrt(cov[0, 0])), F(np.sqrt(cov[1, 1])), F(np.sqrt(cov[2, 2])), F(np.sqrt(cov[3, 3]))
+    while start < n:
+        stop = start + 1
+        while stop < n and ancestors[stop] == ancestors[start]:
+            stop += 1
+        _set_pairs(x, stop, (stop - start - 1) // 2, size, sds)
+        start = stop
+
+
+@lean_piece
+def _set_pairs(x, stop, pairs, size, direction):
+    """Move the last pairs of the copies that end at `stop` by +-1, 2, ... times `size` along a direction (4,)."""
+    d0, d1, d2, d3 = direction
+    for j in range(1, pairs + 1):
+        far = size * F(j)
+        for place, side in ((stop - 2 * j, far), (stop - 2 * j + 1, -far)):
+            x[0, place] += side * d0
+            x[1, place] += side * d1
+            x[2, place] += side * d2
+            x[3, place] += side * d3
 
 
 @lean_piece

@@ -29,6 +29,7 @@ TRACKING = record(
         ("silent_information", "i8"),
         ("resample_below", "f8"),
         ("spread_scale", "f8"),  # 0: systematic resampling alone
+        ("spread_alike", "i8"),  # 1: along one direction for all parents
         ("redraw", "i8"),
         ("search", "i8"),
         ("log_search_miss", "f8"),
@@ -96,7 +97,8 @@ def _constants(scenario: Scenario) -> np.ndarray:
         pooled=t.fusion == "pooled",
         silent_information=t.silent_information,
         resample_below=t.resample_below,
-        spread_scale=t.spread_scale if t.resampling == "spread" else 0.0,
+        spread_scale=0.0 if t.resampling == "systematic" else t.spread_scale,
+        spread_alike=t.resampling == "common_spread",
         redraw=t.redraw_on_handover,
         search=t.search,
         log_search_miss=math.log(t.search_miss),

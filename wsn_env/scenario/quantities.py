@@ -28,6 +28,7 @@ class Quantities(TypedDict, total=False):
     typical_error_m: float
     typical_energy_mj: float
     unscored: int
+    ends_outside: bool
     reference_error_m: float
     reference_energy_mj: float
     field: Field
@@ -136,7 +137,7 @@ class Quantities(TypedDict, total=False):
     fusion: Literal["joint", "pooled"]
     silent_information: bool
     resample_below: float
-    resampling: Literal["systematic", "spread"]
+    resampling: Literal["systematic", "spread", "common_spread"]
     spread_scale: float
     redraw_on_handover: bool
     filter_q: float | None

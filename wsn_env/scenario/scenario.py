@@ -55,6 +55,12 @@ class Scenario(Section):
     typical_error_m: float = quantity(1.0, "error of a good schedule: the scale of a learner's rewards", above=0)
     typical_energy_mj: float = quantity(0.3, "its energy in a period", above=0)
     unscored: int = quantity(0, "periods at the start that rms_m leaves out: acquisition", at_least=0, whole=True)
+    ends_outside: bool = quantity(
+        False,
+        "an episode ends in the period in which the target is outside the field: tracks are neither reflected at the"
+        " border nor drawn again to stay inside",
+        choices=(True, False),
+    )
     # The hypervolume's reference point: the error of the head alone, the energy of every node within sensing range,
     # both measured (nearest0; static_cluster or the scenario's own policy) and rounded up past their intervals.
     reference_error_m: float = quantity(1.5, "mean error that a point of a front must stay below", above=0)
@@ -76,6 +82,8 @@ class Scenario(Section):
                 value.check_functions()
         if self.unscored >= self.periods:
             raise ScenarioError(f"Scenario.unscored = {self.unscored}: must be below periods = {self.periods}")
+        if self.ends_outside and self.unscored:
+            raise ScenarioError(f"Scenario.unscored = {self.unscored}: must be 0 with ends_outside = True")
         self._check_tracker()
         low, high = self.lam_range
         if not (np.isfinite([low, high]).all() and 0 <= low <= high) or (low == 0) != (high == 0):
@@ -163,11 +171,6 @@ class Scenario(Section):
     def reach_m(self) -> float:
         """From here on a node detects nothing (with a threshold, less than once in a million periods)."""
         return self.detection.distances_m(self.measurement)[1]
-
-    @property
-    def scored(self) -> int:
-        """Periods that rms_m is made of."""
-        return self.periods - self.unscored
 
     @property
     def handover_bits(self) -> int:

@@ -61,13 +61,14 @@ class Tracking(Section):
     resample_below: float = quantity(
         2 / 3, "resample at N_eff below this share of P (eq. 14); 1: always", at_least=0, at_most=1
     )
-    resampling: Literal["systematic", "spread"] = quantity(
+    resampling: Literal["systematic", "spread", "common_spread"] = quantity(
         "systematic",
-        "systematic: copies of the chosen; spread: further copies lie about them in pairs",
-        choices=("systematic", "spread"),
+        "systematic: copies of the chosen; spread: further copies lie about them in pairs, along a direction of each"
+        " parent's own; common_spread: along one direction for all, the sds of the cloud",
+        choices=("systematic", "spread", "common_spread"),
     )
     spread_scale: float = quantity(
-        0.5, "spread: distance of the first pair, in sds of the cloud", at_least=0, at_most=10
+        0.5, "(common_)spread: distance of the first pair, in sds of the cloud", at_least=0, at_most=10
     )
     redraw_on_handover: bool = quantity(
         False,

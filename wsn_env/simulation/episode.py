@@ -116,7 +116,8 @@ class Tracks:
         self._motion = np.zeros(1, constants_type(motion, scenario))
         fill_constants(self._motion, motion, scenario)
         side_m, depth_m = scenario.field.room_m
-        self._course = scenario.period_s, side_m, depth_m, motion.recorded_tracks(scenario), motion.bounded
+        bounded = motion.bounded and not scenario.ends_outside
+        self._course = scenario.period_s, side_m, depth_m, motion.recorded_tracks(scenario), bounded
 
     def draw(self, rows: np.ndarray, keys: np.ndarray, tracks: np.ndarray, threads: int) -> None:
         """Fill tracks (B, periods + 1, 4) in the rows marked."""

@@ -43,8 +43,8 @@ MEMORY = record(
 
 def has_reference(scenario: Scenario) -> bool:
     """Whether reports have Fisher information and errors that do not last over periods: no binary sensors, whose bit
-    jumps at an edge, and no beacon's levels."""
-    return scenario.measurement.independent
+    jumps at an edge, and no beacon's levels. Nor where episodes end before the horizon that the mean is over."""
+    return scenario.measurement.independent and not scenario.ends_outside
 
 
 def process_noise(scenario: Scenario) -> float:

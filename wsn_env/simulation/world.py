@@ -122,6 +122,14 @@ class World:
             self._in_rows(lost, period.settle, outcome.row, state.handle)
         return state, outcome
 
+    def left(self, state: State) -> np.ndarray:
+        """(B,) bool: the episode ends in this period, since the target is outside the field (`ends_outside`)."""
+        if not self.scenario.ends_outside:
+            return np.zeros(state.rows, bool)
+        instant = np.minimum(state.period, self.scenario.periods)
+        target = state.track[np.arange(state.rows), instant, ::2]
+        return (state.period > 0) & ((target < 0) | (target > self.scenario.field.room_m)).any(axis=1)
+
     def _search(self, rows, state: State, outcome: Outcome) -> None:
         found = np.zeros(state.rows, bool)
         self._in_rows(rows, search.search, found, outcome.row, state.handle)

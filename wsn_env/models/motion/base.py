@@ -24,7 +24,7 @@ class Course(NamedTuple):
     side_m: float  # extent of the field along x
     depth_m: float  # along y
     recorded: np.ndarray  # (N, periods + 1, 4): the motion's `recorded_tracks`
-    bounded: bool  # the motion's
+    bounded: bool  # the motion's, unless episodes end outside the field: False: the target may leave it
 
 
 @dataclass(frozen=True)

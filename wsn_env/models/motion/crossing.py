@@ -23,7 +23,7 @@ class Crossing(Motion):
     """Towards a uniform point of the inner field from another, in the horizon's time, but for noise (the default).
 
     The noise is drawn until the whole track lies in the field: a mirror at the border would turn the velocity in an
-    instant, which no filter with this q can follow.
+    instant, which no filter with this q can follow. Where episodes end outside the field it is drawn once.
     """
 
     allocates: ClassVar[bool] = False
@@ -69,5 +69,5 @@ class Crossing(Motion):
                 ax, ay = draws.normal_pair(stream, 1_000_000 + attempt * steps + k)
                 advance(track[k], course.period_s, sd * ax, sd * ay, track[k + 1])
                 inside &= 0.0 <= track[k + 1, 0] <= course.side_m and 0.0 <= track[k + 1, 2] <= course.side_m
-            if inside:
+            if inside or not course.bounded:
                 return

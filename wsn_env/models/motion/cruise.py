@@ -23,9 +23,10 @@ TRIES = 1000
 class Cruise(Motion):
     """From a uniform point of the inner field at a given speed in any direction, with white acceleration.
 
-    Start, heading and noise are drawn until the whole track keeps its distance from the border. White acceleration of
-    density D [m^2/s^3] is, in periods of T seconds, one of sd sqrt(D / T): the positions lack an independent part of
-    variance D T^3 / 12 then, which is negligible beside any measurement here.
+    Start, heading and noise are drawn until the whole track keeps its distance from the border; where episodes end
+    outside the field the first draw is taken. White acceleration of density D [m^2/s^3] is, in periods of T seconds,
+    one of sd sqrt(D / T): the positions lack an independent part of variance D T^3 / 12 then, which is negligible
+    beside any measurement here.
     """
 
     allocates: ClassVar[bool] = False
@@ -46,7 +47,7 @@ class Cruise(Motion):
         if self.inset_m < self.margin_m or self.inset_m >= side / 2:
             raise self._limit("inset_m", f"at least margin_m = {self.margin_m} and below half the side, {side / 2} m")
         fastest = (side - self.inset_m - self.margin_m) / (scenario.periods * scenario.period_s)
-        if self.speed_ms > fastest:
+        if self.speed_ms > fastest and not scenario.ends_outside:
             allowed = f"at most {fastest:.4g} m/s, from the inner field to the margin in {scenario.periods} periods"
             raise self._limit("speed_ms", allowed)
 
@@ -66,6 +67,6 @@ class Cruise(Motion):
                 advance(track[k], course.period_s, sd * ax, sd * ay, track[k + 1])
                 inside &= m.margin_m <= track[k + 1, 0] <= course.side_m - m.margin_m
                 inside &= m.margin_m <= track[k + 1, 2] <= course.side_m - m.margin_m
-            if inside:
+            if inside or not course.bounded:
                 return
             first += 4 + 2 * steps

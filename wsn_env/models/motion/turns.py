@@ -42,12 +42,13 @@ class Turns(Motion):
                     heading += 2.0 * HALF_PI * (draws.uniform(stream, 2 * k + 2) - 0.5)
                 advance(track[k - 1], course.period_s, 0.0, 0.0, track[k])
             s, c = sincos(heading)
-            if track[k, 0] < 0.0 or track[k, 0] > course.side_m:  # the mirror turns the heading too
-                c = -c
-            if track[k, 2] < 0.0 or track[k, 2] > course.side_m:
-                s = -s
-            reflect(track[k], 0, course.side_m)
-            reflect(track[k], 2, course.side_m)
-            heading = heading_of(s, c)
+            if course.bounded:
+                if track[k, 0] < 0.0 or track[k, 0] > course.side_m:  # the mirror turns the heading too
+                    c = -c
+                if track[k, 2] < 0.0 or track[k, 2] > course.side_m:
+                    s = -s
+                reflect(track[k], 0, course.side_m)
+                reflect(track[k], 2, course.side_m)
+                heading = heading_of(s, c)
             track[k, 1] = m.speed_ms * c
             track[k, 3] = m.speed_ms * s
