@@ -58,29 +58,41 @@ def judge_claim(plainly: bool, under_reading: bool) -> Verdict:
     return HOLDS if plainly else UNDER_READING
 
 
-def write_and_print_claims(out: Path, claims: Sequence[Claim], expected: Sequence[Expectation]) -> None:
-    """Write claims.csv, expected.csv and summary.md to the folder and print the first two, after all else."""
+def write_and_print_claims(
+    out: Path, claims: Sequence[Claim], expected: Sequence[Expectation], additions: Sequence[Claim] = ()
+) -> None:
+    """Write claims.csv, expected.csv and summary.md to the folder and print the first two, after all else.
+
+    Args:
+        additions: what we claim beyond the paper, for additions.csv; `paper` says what was expected.
+    """
     write_claims(out / "claims.csv", claims)
+    if additions:
+        write_claims(out / "additions.csv", additions, "expected")
     write_expected(out / "expected.csv", expected)
-    write_summary(out / "summary.md", claims, expected)
+    write_summary(out / "summary.md", claims, expected, additions)
     print_claims(claims)
+    if additions:
+        print_claims(additions, "What we add", "expected")
     print_expected(expected)
     print(f"written: {out}")
 
 
-def write_claims(path: Path, claims: Iterable[Claim]) -> None:
+def write_claims(path: Path, claims: Iterable[Claim], source: str = "paper") -> None:
     """claims.csv and claims.md: claim, paper, ours, verdict."""
-    columns, rows = ("claim", "paper", "ours", "verdict"), [(c.claim, c.paper, c.ours, c.verdict) for c in claims]
+    columns, rows = ("claim", source, "ours", "verdict"), [(c.claim, c.paper, c.ours, c.verdict) for c in claims]
     write_sheet(path, Sheet(columns, rows))
     with replacing(path.with_suffix(".md")) as temporary:
         temporary.write_text(markdown_table(columns, rows, left=(0, 1, 2, 3)), encoding="utf-8")
 
 
-def write_summary(path: Path, claims: Sequence[Claim], expected: Sequence[Expectation]) -> None:
+def write_summary(
+    path: Path, claims: Sequence[Claim], expected: Sequence[Expectation], additions: Sequence[Claim] = ()
+) -> None:
     """How many expected figures are met and how many claims have which verdict, as a line of Markdown."""
     met = sum(e.within for e in expected)
-    verdicts = ", ".join(f"{sum(c.verdict == verdict for c in claims)} {verdict}" for verdict in COLOURS)
-    line = f"Of {len(expected)} expected figures {met} are met. Of {len(claims)} claims: {verdicts}.\n"
+    line = f"Of {len(expected)} expected figures {met} are met. Of {len(claims)} claims: {_verdicts(claims)}."
+    line += f" Of {len(additions)} additions of ours: {_verdicts(additions)}.\n" if additions else "\n"
     missed = "".join(
         f"- missed: {e.quantity}: {e.measured:.4g}, expected {e.expected:.4g} ± {e.tolerance:.2g}\n"
         for e in expected
@@ -90,16 +102,20 @@ def write_summary(path: Path, claims: Sequence[Claim], expected: Sequence[Expect
         temporary.write_text(line + (f"\n{missed}" if missed else ""), encoding="utf-8")
 
 
+def _verdicts(claims: Sequence[Claim]) -> str:
+    return ", ".join(f"{sum(c.verdict == verdict for c in claims)} {verdict}" for verdict in COLOURS)
+
+
 def write_expected(path: Path, expected: Iterable[Expectation]) -> None:
     """expected.csv: quantity, expected, tolerance, measured, within."""
     rows = [(e.quantity, e.expected, e.tolerance, e.measured, e.within) for e in expected]
     write_sheet(path, Sheet(("quantity", "expected", "tolerance", "measured", "within"), rows))
 
 
-def print_claims(claims: Iterable[Claim]) -> None:
+def print_claims(claims: Iterable[Claim], title: str = "Claims", source: str = "paper") -> None:
     """The claims with their verdicts in colour."""
-    table = Table(title="Claims", title_justify="left", show_lines=True)
-    for column in ("claim", "paper", "ours", "verdict"):
+    table = Table(title=title, title_justify="left", show_lines=True)
+    for column in ("claim", source, "ours", "verdict"):
         table.add_column(column)
     for c in claims:
         table.add_row(escape(c.claim), escape(c.paper), escape(c.ours), f"[{COLOURS[c.verdict]}]{c.verdict}[/]")
