@@ -172,5 +172,5 @@ def median_rms_m(record: Record) -> tuple[float, float]:
 
 def periods_inside(record: Record, side_m: float) -> np.ndarray:
     """(R,) periods up to the first in which the target is outside, that one included."""
-    outside = ((record.target_m < 0) | (record.target_m > side_m)).any(axis=2)
+    outside = np.any((record.target_m < 0) | (record.target_m > side_m), axis=2)
     return np.where(outside.any(axis=1), outside.argmax(axis=1) + 1, outside.shape[1])
