@@ -27,7 +27,7 @@ from wsn_env.models.measurement.base import node_at
 from wsn_env.models.state import Outcome, State, state_at
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import constants
-from wsn_env.simulation.reference import value_information
+from wsn_env.simulation.reference import process_noise, value_information
 
 
 def has_bound(scenario: Scenario) -> bool:
@@ -73,7 +73,7 @@ class Bound:
 
     def per_period_m(self) -> np.ndarray:
         """(periods,) root of the least mean square error in each period [m]."""
-        t, q = self._scenario.period_s, self._scenario.motion.process_noise_ms2
+        t, q = self._scenario.period_s, process_noise(self._scenario)
         f, g = np.kron(np.eye(2), [[1.0, t], [0.0, 1.0]]), np.kron(np.eye(2), [[t * t / 2], [t]])
         tracking, own = self._scenario.tracking, self._scenario.motion.start_sds
         sds = np.array([[tracking.start_sd_m, tracking.start_sd_ms], own])

@@ -44,8 +44,7 @@ class DetectionRule(Kind):
         "known_radius",
     )
 
-    regular: ClassVar[bool] | property = True  # whether p(d) has a slope everywhere and every period draws anew, as the
-    # bound supposes
+    regular: ClassVar[bool] = True  # whether p(d) has a slope everywhere and every period draws anew, for the bound
     values_decide: ClassVar[bool] = False  # whether the measured value decides, so that detecting tells of the value
 
     def check(self, scenario: Scenario) -> None:
