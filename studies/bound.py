@@ -1,10 +1,10 @@
-"""Can any tracker beat the bound, or the reference? A particle filter that knows everything tries.
+"""Can any tracker beat the bound, or the reference? A particle filter that is given all laws tries.
 
     python -m studies.bound --episodes 2000 --particles 5000
 
-It is written apart from the package's filters, and knows all that could be known: fields, schedules, the start's law,
-the target's own noise, who was awake and kept silent, and (in the presets' own worlds) that tracks stay inside.
-Policies play with the scenario's tracker; their episodes are tracked once more by this filter. Writes bound.md.
+It is written apart from the package's filters, and is given fields, schedules, the laws of start, motion and detection,
+who was awake and silent, and (in the presets' own worlds) that tracks stay inside. Policies play with the scenario's
+tracker; their episodes are tracked once more by this filter. Writes bound.md.
 """
 
 from __future__ import annotations
@@ -23,10 +23,13 @@ import tyro
 from wsn_env import Scenario, World, make_policy
 from wsn_env.cli import make_scenario
 from wsn_env.evaluation.files import replacing
+from wsn_env.evaluation.intervals import Measured
 from wsn_env.evaluation.progress import Progress, progress_bar
 from wsn_env.evaluation.rollout import BLOCK, episodes, evaluation_seeds
+from wsn_env.models.measurement.level import Level
+from wsn_env.models.measurement.position import Position
 from wsn_env.reports.markdown import markdown_table
-from wsn_env.simulation.bound import Bound, has_bound
+from wsn_env.simulation.bound import Bound, why_no_bound
 from wsn_env.simulation.reference import Reference
 
 FREE = {  # tracks whose law the bound supposes, in fields that they seldom leave
@@ -41,7 +44,7 @@ KERNEL = 0.1  # sds of the cloud by which copies of a particle are parted
 
 @dataclass
 class Study:
-    """RMS of the policy's own tracker and of a filter that knows everything, over bound and reference."""
+    """RMS of the policy's own tracker and of a strong filter, over bound and reference."""
 
     scenarios: list[str]
     """Presets; each is played with its own motion and with a free one."""
@@ -50,7 +53,7 @@ class Study:
     episodes: int = 2000
     """Of the first policy with a free motion; a quarter as many elsewhere."""
     particles: int = 5000
-    """Of the filter that knows everything."""
+    """Of the strong filter."""
     seed: int = 0
     """Which episodes, as of `wsn evaluate`."""
     out: Path = Path("out/bound")
@@ -87,8 +90,10 @@ class Law(NamedTuple):
 def law_of(scenario: Scenario) -> Law:
     """Of a scenario with positions or levels."""
     m, d, motion, t = scenario.measurement, scenario.detection, scenario.motion, scenario.tracking
+    if not isinstance(m, (Position, Level)):
+        raise ValueError(f"Scenario.measurement = {type(m).__name__}: allowed are Position, Rssi and Sonar")
     strengths, thresholded = hasattr(m, "noise_db"), d.values_decide
-    q = scenario.filter_q if motion.process_noise_ms2 is None else motion.process_noise_ms2
+    q = scenario.track_q
     side_m, depth_m = scenario.field.room_m
     prior = tuple(map(float, (side_m / 2, depth_m / 2, *(motion.start_sds or (0, 0)))))
     level = (
@@ -270,44 +275,35 @@ class Compared(NamedTuple):
     own: np.ndarray
     strong: np.ndarray
     reference: np.ndarray
-    bound_m: float | None
+    bound: Measured | None
+
+    def over_bound(self) -> Measured | None:
+        """The strong filter's root mean square error over the bound."""
+        if self.bound is None:
+            return None
+        strong, ratio = Measured.root_mean(self.strong), Measured.root_mean(self.strong).value / self.bound.value
+        return Measured(ratio, ratio * math.hypot(strong.stderr / strong.value, self.bound.stderr / self.bound.value))
 
 
 def compare(policy: str, scenario: Scenario, study: Study, progress: Progress) -> Compared:
     """Play and track once more."""
-    bound = Bound(scenario) if has_bound(scenario) else None
+    bound = None if why_no_bound(scenario) else Bound(scenario)
     seeds, law, parts = evaluation_seeds(study.seed, study.episodes), law_of(scenario), []
-    for start in range(0, len(seeds), BLOCK):
-        played, own, reference = play(policy, scenario, seeds[start : start + BLOCK], bound)
+    block = max(2, min(BLOCK, study.episodes // 10))  # the bound's standard error is between blocks
+    for start in range(0, len(seeds), block):
+        played, own, reference = play(policy, scenario, seeds[start : start + block], bound)
         parts.append((own, track_all(law, played, study.particles, start), reference))
-        progress(min(start + BLOCK, len(seeds)), len(seeds), f"{scenario.name}, {policy}")
-    return Compared(*map(np.concatenate, zip(*parts, strict=True)), None if bound is None else bound.rms_m())
-
-
-def root(squares: np.ndarray) -> tuple[float, float]:
-    """Root of the mean, and its standard error."""
-    rms = np.sqrt(squares.mean())
-    return rms, squares.std(ddof=1) / np.sqrt(len(squares)) / (2 * rms)
-
-
-def ratio(squares: np.ndarray, others: np.ndarray) -> tuple[float, float]:
-    """Root of the ratio of means over the same episodes, and its standard error (delta method)."""
-    found = np.sqrt(squares.mean() / others.mean())
-    rest = squares / squares.mean() - others / others.mean()
-    return found, found / 2 * rest.std(ddof=1) / np.sqrt(len(squares))
-
-
-def write(figure: tuple[float, float], digits: int = 3) -> str:
-    """A figure and its standard error."""
-    return f"{figure[0]:.{digits}f} ({figure[1]:.{digits}f})"
+        progress(min(start + block, len(seeds)), len(seeds), f"{scenario.name}, {policy}")
+    least = None if bound is None else Measured(bound.rms_m(), bound.stderr_m())
+    return Compared(*map(np.concatenate, zip(*parts, strict=True)), least)
 
 
 def row_of(scenario: Scenario, policy: str, found: Compared) -> list[str]:
     """Of the table."""
-    over = "-" if found.bound_m is None else write([x / found.bound_m for x in root(found.strong)])
+    own, strong = Measured.root_mean(found.own), Measured.root_mean(found.strong)
+    ratios = found.over_bound() or "-", Measured.root_ratio(found.strong, found.reference)
     motion = type(scenario.motion).__name__.lower()
-    strong, own = write(root(found.strong)), write(root(found.own))
-    return [f"{scenario.name}, {motion}, {policy}", own, strong, over, write(ratio(found.strong, found.reference))]
+    return [f"{scenario.name}, {motion}, {policy}", *map(str, (own, strong, *ratios))]
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -319,13 +315,13 @@ def main(arguments: list[str] | None = None) -> int:
         for settings in (FREE[name] + " search=False", ""):
             scenario = make_scenario(name, settings.split(), [])
             for policy in study.policies:
-                whole = has_bound(scenario) and policy == study.policies[0]
+                whole = not why_no_bound(scenario) and policy == study.policies[0]
                 asked = study if whole else replace(study, episodes=max(study.episodes // 4, 2))
                 with progress_bar() as report:
                     found = compare(policy, scenario, asked, report)
                 rows.append(row_of(scenario, policy, found))
                 print(" | ".join(rows[-1]), flush=True)
-    columns = ("world, motion, policy", "own tracker m", "all known m", "over the bound", "over the reference")
+    columns = ("world, motion, policy", "own tracker m", "strong filter m", "over the bound", "over the reference")
     text = markdown_table(columns, rows)
     study.out.mkdir(parents=True, exist_ok=True)
     with replacing(study.out / "bound.md") as path:

@@ -12,8 +12,10 @@ from pathlib import Path
 import tyro
 
 from wsn_env.agents.planner import Planner
+from wsn_env.agents.ppo import PRETRAINED
 from wsn_env.evaluation.comparison import Evaluation, evaluate
 from wsn_env.evaluation.files import replacing
+from wsn_env.evaluation.intervals import Measured
 from wsn_env.evaluation.policies import Policy, make_policy
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.models.state import Cluster
@@ -71,16 +73,17 @@ def main(arguments: list[str] | None = None) -> None:
     scenario = Scenario.named(settings.scenario, **({} if settings.lam is None else {"lam": settings.lam}))
     planner = Planner(scenario, settings.horizon, settings.worlds)
     planner.act(View.of(World(scenario).reset([0])))  # compiles and rehearses
-    names = ["ppo", *settings.against]
+    shipped = ["ppo"] * (PRETRAINED / scenario.name).is_dir()
+    names = list(dict.fromkeys([*shipped, *settings.against]))
     policies = {"planner": planner} | {name: make_policy(name, scenario) for name in names}
     timed = {name: Timed(policy) for name, policy in policies.items()}
     with progress_bar() as report:
         found = evaluate(timed, scenario, None, settings.episodes, settings.seed, progress=report, threads=1)
     print_tables(found)
-    for lam in found.lams:
-        rival = max(settings.against, key=lambda name: found.values(name, lam, "return").mean())
-        text = table(found, lam, ["planner", "ppo", rival], timed)
-        print(text)
+    (lam,) = found.lams
+    rival = max(settings.against, key=lambda name: found.values(name, lam, "return").mean())
+    text = table(found, lam, ["planner", *shipped, rival], timed)
+    print(text)
     settings.out.mkdir(parents=True, exist_ok=True)
     with replacing(settings.out / "planning.md") as path:
         path.write_text(text)
@@ -94,8 +97,7 @@ def table(found: Evaluation, lam: float, names: list[str], timed: dict[str, Time
         gain, share = found.difference("planner", name, lam), -100 / own.mean()
         ahead = f"{share * gain.mean:+.1f} [{share * gain.low:+.1f}, {share * gain.high:+.1f}] %"
         cost = f"{1e3 * timed[name].seconds / timed[name].decisions:.2g} ms"
-        returned = f"{own.mean():.1f} ({own.std(ddof=1) / len(own) ** 0.5:.1f})"
-        rows.append([name, returned, "" if name == "planner" else ahead, cost])
+        rows.append([name, str(Measured.mean(own)), "" if name == "planner" else ahead, cost])
     columns = (f"{found.scenario.name}, lam = {lam:g}", "return", "planner ahead of it", "a decision, one core")
     return markdown_table(columns, rows)
 

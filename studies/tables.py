@@ -21,6 +21,7 @@ from studies.seeds import best_of, format_advantage
 from wsn_env.agents.ppo import PRETRAINED
 from wsn_env.evaluation.comparison import evaluate
 from wsn_env.evaluation.files import replacing
+from wsn_env.evaluation.intervals import Measured
 from wsn_env.evaluation.policies import make_policy
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.evaluation.rollout import BLOCK, evaluation_seeds, rollout
@@ -41,13 +42,13 @@ HONESTY = (  # scenario, policy, what is changed, what that shows
     ("PreDC-v0", "nearest3", "", "the filter's q is twice the track's, 0.05 against 0.025 m/s²"),
     ("PreDC-v0", "nearest3", "filter_q=0.025", "with the track's own q it is honest"),
     ("PreDC-v0", "nearest3", "fusion=pooled filter_q=0.025", "pooling weighs each member's share of particles apart"),
-    ("Rssi-v0", "informed3", "", "q, as above"),
-    ("Rssi-v0", "informed3", "filter_q=0.025", "with the track's own q it is honest"),
+    ("Rssi-v0", "informed3", "", "the filter's q is twice the track's, 0.05 against 0.025 m/s²"),
+    ("Rssi-v0", "informed3", "filter_q=0.025", "with the track's own q; a lost track now and then"),
     ("Anchors-v0", "nearest3", "", "q is twice the track's, 1 against 0.5 m/s²"),
     ("Anchors-v0", "nearest3", "filter_q=0.5", "with the track's own q it is honest"),
     ("Binary-v0", "boundary", "", "q is three times the track's, and an edge of 1 m is believed where there is none"),
     ("Binary-v0", "boundary", "edge_m=0.3", "with a sharper edge particles run short now and then"),
-    ("Binary-v0", "informed3", "", "the same"),
+    ("Binary-v0", "informed3", "", "q is three times the track's, and an edge of 1 m is believed where there is none"),
     ("Underwater-v0", "strongest_signal", "", "spread copies widen the cloud"),
     ("Underwater-v0", "strongest_signal", "resampling=systematic", "repeated copies let it collapse: far too sure"),
     ("Ble-v0", "informed3", "", "a level's likelihood counts with an exponent of 0.7, for recorded rooms"),
@@ -61,25 +62,15 @@ class Tables:
 
     only: list[str] = field(default_factory=list)
     """Names; left out: all."""
-    episodes: int = 400
-    """Of each cell; those of shipped policies have 1,000 with the default."""
+    episodes: int | None = None
+    """Of each cell; left out: 400, and 1,000 where percents are compared."""
     out: Path = Path("out/tables")
     """Folder."""
 
 
-def figure(values: np.ndarray, digits: int) -> str:
-    """Mean and standard error."""
-    return f"{values.mean():.{digits}f} ({values.std(ddof=1) / len(values) ** 0.5:.{digits}f})"
-
-
-def root_figure(squares: np.ndarray, digits: int) -> str:
-    """Root of the mean, and its standard error."""
-    root = np.sqrt(squares.mean())
-    return f"{root:.{digits}f} ({squares.std(ddof=1) / len(squares) ** 0.5 / (2 * root):.{digits}f})"
-
-
-def play(scenario: Scenario, policy: str, episodes: int) -> dict[str, np.ndarray]:
+def play(scenario: Scenario, policy: str, episodes: int | None) -> dict[str, np.ndarray]:
     """Columns of an evaluation's first episodes."""
+    episodes = episodes or 400
     made, world, seeds = make_policy(policy, scenario), World(scenario), evaluation_seeds(0, episodes)
     rows = [row for first in range(0, episodes, BLOCK) for row in rollout(made, world, seeds[first : first + BLOCK])]
     return {column: np.array([row[column] for row in rows]) for column in rows[0]}
@@ -93,7 +84,7 @@ def scenario_of(name: str, settings: str = "") -> Scenario:
     return scenario if not isinstance(scenario.lam, tuple) else scenario.override(lam=scenario.lam_octaves[2])
 
 
-def reference_points(episodes: int) -> tuple[list[str], Rows]:
+def reference_points(episodes: int | None) -> tuple[list[str], Rows]:
     """The reference point of each scenario beside what it was chosen by."""
     columns = ["scenario", "`reference_error_m`", "error of the head alone (nearest0) m", "`reference_energy_mj`"]
     rows = []
@@ -101,23 +92,23 @@ def reference_points(episodes: int) -> tuple[list[str], Rows]:
         scenario = scenario_of(name)
         alone, dear = play(scenario, "nearest0", episodes), play(scenario, costly, episodes)
         points = f"{scenario.reference_error_m:g}", f"{scenario.reference_energy_mj:g}"
-        energy = f"{figure(dear['energy_mj'], 2)}, {costly}"
-        rows.append([name, points[0], figure(alone["error_m"], 2), points[1], energy])
+        energy = f"{Measured.mean(dear['energy_mj'])}, {costly}"
+        rows.append([name, points[0], str(Measured.mean(alone["error_m"])), points[1], energy])
     return [*columns, "energy of the most expensive competitive policy mJ"], rows
 
 
-def honesty(episodes: int) -> tuple[list[str], Rows]:
+def honesty(episodes: int | None) -> tuple[list[str], Rows]:
     """Whether filters expect the error that they have."""
     rows = []
     for name, policy, settings, why in HONESTY:
         found = play(scenario_of(name, settings), policy, episodes)
-        ratios = figure(found["anees"], 2), figure(found["variance_ratio"], 2)
+        ratios = (str(Measured.mean(found[column])) for column in ("anees", "variance_ratio"))
         what = f"{name}, {policy}" + (f", {settings}" if settings else "")
-        rows.append([what, *ratios, root_figure(found["rms_m"] ** 2, 3), why])
+        rows.append([what, *ratios, str(Measured.root_mean(found["rms_m"] ** 2)), why])
     return ["scenario, policy, changes", "ANEES", "e² / trace", "RMS m", "why"], rows
 
 
-def silence(episodes: int) -> tuple[list[str], Rows]:
+def silence(episodes: int | None) -> tuple[list[str], Rows]:
     """What it is worth to weigh particles by who kept silent."""
     rows = []
     for name in ("PreDC-v0", "Rssi-v0"):
@@ -125,64 +116,59 @@ def silence(episodes: int) -> tuple[list[str], Rows]:
             play(scenario_of(name, f"silent_information={told}"), "nearest3", episodes)["rms_m"] ** 2
             for told in (False, True)
         ]
-        rows.append([name, *(root_figure(each, 3) for each in squares)])
+        rows.append([name, *(str(Measured.root_mean(each)) for each in squares)])
     return ["nearest3", "RMS m, the values alone", "RMS m, also who reported"], rows
 
 
-def anchors(episodes: int) -> tuple[list[str], Rows]:
+def anchors(episodes: int | None) -> tuple[list[str], Rows]:
     """What few anchors tell."""
     rows = []
     for policy in ("nearest1", "informed1", "informed3", "all"):
         found = play(scenario_of("Anchors-v0"), policy, episodes)
-        rows.append([policy, root_figure(found["rms_m"] ** 2, 2), figure(found["energy_mj"], 3)])
+        rows.append([policy, str(Measured.root_mean(found["rms_m"] ** 2)), str(Measured.mean(found["energy_mj"]))])
     return ["Anchors-v0", "RMS m", "energy mJ a period"], rows
 
 
-def shipped(name: str, episodes: int, rules: tuple[str, ...] = ()) -> tuple[list[str], Rows]:
+def shipped(name: str, episodes: int | None, rules: tuple[str, ...] = ()) -> tuple[list[str], Rows]:
     """Returns of the policy that comes with the package, and of rules, at six trade-offs."""
     scenario = Scenario.named(name)
     lams = scenario.lam_octaves
-    found = evaluate(["ppo", *rules], scenario, lams, whole(episodes))
-    rows = [[name, *(figure(found.values("ppo", lam, "return"), 1) for lam in lams)]]
-    rows += [[rule, *(figure(found.values(rule, lam, "return"), 1) for lam in lams)] for rule in rules]
+    found = evaluate(["ppo", *rules], scenario, lams, episodes or 1000)
+    rows = [[name, *(str(Measured.mean(found.values("ppo", lam, "return"))) for lam in lams)]]
+    rows += [[rule, *(str(Measured.mean(found.values(rule, lam, "return"))) for lam in lams)] for rule in rules]
     return ["lam m/mJ", *(f"{lam:g}" for lam in lams)], rows
 
 
-def comparison(name: str, episodes: int) -> tuple[list[str], Rows]:
+def comparison(name: str, episodes: int | None) -> tuple[list[str], Rows]:
     """The policy that comes with the package beside rules, and what it is ahead of them in percent."""
     scenario, lams = Scenario.named(name), (1.0, 4.0, 16.0)
     sizes = [f"nearest{n}" for n in range(9)]
     others = {"size by the belief's spread, tuned for each lam": "adaptive"}
     others |= {"information for energy, tuned for each lam": "greedy", "Pre-DC": "pre_dc"}
-    found = evaluate(["ppo", *sizes, *others.values()], scenario, lams, whole(episodes))
+    found = evaluate(["ppo", *sizes, *others.values()], scenario, lams, episodes or 1000)
     rows = [["**PPO**", *(f"**{found.values('ppo', lam, 'return').mean():.1f}**" for lam in lams)]]
     best = {lam: best_of(found, sizes, lam) for lam in lams}
     for label, rule in {"best size in hindsight": "", **others}.items():
         cells = []
         for lam in lams:
             rival = rule or best[lam]
-            theirs = figure(found.values(rival, lam, "return"), 1)
+            theirs = str(Measured.mean(found.values(rival, lam, "return")))
             cells.append(f"{theirs}: {format_advantage(found, ['ppo'], rival, lam)}")
         rows.append([label, *cells])
     return [name, *(f"lam = {lam:g}" for lam in lams)], rows
 
 
-def references(episodes: int) -> tuple[list[str], Rows]:
+def references(episodes: int | None) -> tuple[list[str], Rows]:
     """How near to the Cramer-Rao reference the usual filter comes, at lam = 4."""
     names, rows = ("ppo", "greedy", "adaptive", "nearest2"), []
     for scenario in ("PreDC-v0", "Rssi-v0"):
-        found = evaluate(names, Scenario.named(scenario), [4.0], episodes)
+        found = evaluate(names, Scenario.named(scenario), [4.0], episodes or 400)
         ratios = [found.rms_over_reference(name, 4.0) for name in names]
         rows.append([scenario, *(f"{ratio.mean:.2f} [{ratio.low:.2f}, {ratio.high:.2f}]" for ratio in ratios)])
     return ["RMS / reference, lam = 4", *names], rows
 
 
-def whole(episodes: int) -> int:
-    """A thousand where the default is asked for: for what is compared by a percent."""
-    return 1000 if episodes == Tables.episodes else episodes
-
-
-TABLES: dict[str, Callable[[int], tuple[list[str], Rows]]] = {
+TABLES: dict[str, Callable[[int | None], tuple[list[str], Rows]]] = {
     "reference_points": reference_points,
     "honesty": honesty,
     "silence": silence,

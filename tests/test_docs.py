@@ -7,6 +7,7 @@ from pkgutil import resolve_name
 
 import pytest
 
+from tests.figures import found_blocks
 from wsn_env.cli import main
 from wsn_env.envs.registration import IDS
 from wsn_env.evaluation.policies import policy_names
@@ -52,6 +53,11 @@ def test_the_tutorials_policy_joins_a_comparison(tmp_path, monkeypatch, capsys):
     assert len(commands) == 2 and Path("replay.html").exists()
     rows = Path("out/mine/evaluation.csv").read_text()
     assert all(f"\n{label}," in rows for label in ("mine.py:Cautious", "cautious", "pre_dc"))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_no_block_is_empty(page):
+    assert not [name for _, name, content in found_blocks(page.read_text()) if not content.strip()]
 
 
 def test_the_readme_is_short():

@@ -16,7 +16,7 @@ from wsn_env.evaluation.rollout import episodes, evaluation_seeds, rollout
 from wsn_env.reports.pictures import write_picture
 from wsn_env.reports.plots import draw_comparison
 from wsn_env.reports.tables import format_markdown, print_tables
-from wsn_env.simulation.reference import Reference, has_reference, process_noise
+from wsn_env.simulation.reference import Reference, has_reference
 
 PLAIN = dict(particles=50)
 
@@ -147,8 +147,8 @@ def test_where_it_is(name, overrides, there):
 
 def test_a_motion_without_noise_takes_the_filters():
     sine = Scenario.named("PreDC-v0", motion="sine")
-    assert process_noise(sine) == 0.2 and process_noise(sine.override(filter_q=0.07)) == 0.07
-    assert process_noise(Scenario.named("PreDC-v0", filter_q=0.07)) == 0.025
+    assert sine.track_q == 0.2 and sine.override(filter_q=0.07).track_q == 0.07
+    assert Scenario.named("PreDC-v0", filter_q=0.07).track_q == 0.025
 
 
 @pytest.mark.parametrize("name", ["PreDC-v0", "Rssi-v0", "Underwater-v0"])

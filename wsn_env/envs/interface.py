@@ -45,7 +45,7 @@ class Interface:
     def charge_rest(self, reward: Any, lam: Any, periods: Any) -> tuple[Any, Any]:
         """Charge the periods that are left when an episode ends outside the field: ending must never pay.
 
-        Each costs the scenario's reference error and energy, whatever the policy, which no front's point exceeds.
+        Each costs a fixed price, whatever the policy: that of the scenario's reference point.
 
         Args:
             reward: of the last period, arrays (B, ...) or one row's.

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wsn_env.evaluation import rollout
+from wsn_env.evaluation.intervals import Measured
 from wsn_env.evaluation.policies import Policy, make_policy
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.bound import Bound
@@ -17,8 +18,9 @@ class BoundedError(NamedTuple):
     """A policy's error with the scenario's tracker, beside the bound [m]."""
 
     rms_m: float
-    stderr_m: float  # standard error of rms_m over the episodes
+    rms_stderr_m: float
     bound_m: float  # no tracker's root mean square error is lower
+    bound_stderr_m: float  # the bound's expectations are means over the episodes, too; NaN with fewer than 100
 
 
 def error_bound(policy: Policy | str, scenario: Scenario, episodes: int = 1000, seed: int = 0) -> BoundedError:
@@ -26,12 +28,12 @@ def error_bound(policy: Policy | str, scenario: Scenario, episodes: int = 1000, 
 
     Args:
         policy: or its name.
-        scenario: one that `has_bound`: motion="free", start="known", search=False.
-        episodes: the bound's expectations are means over them.
+        scenario: motion="free", start="known", search=False, with what else the bound supposes.
+        episodes: the bound's expectations are means over them; at least 2.
         seed: which episodes, as of `evaluate`.
 
     Raises:
-        ValueError: where the scenario has no bound.
+        ValueError: where the scenario has no bound, or a node dies.
     """
     policy = make_policy(policy, scenario) if isinstance(policy, str) else policy
     world, seeds = World(scenario), rollout.evaluation_seeds(seed, episodes)
@@ -43,7 +45,5 @@ def error_bound(policy: Policy | str, scenario: Scenario, episodes: int = 1000, 
             bound.advance(state, outcome)
             square += outcome.error_m**2 / scenario.periods
         squares.append(square)
-    square = np.concatenate(squares)
-    rms = float(np.sqrt(square.mean()))
-    error = float(square.std(ddof=1) / np.sqrt(len(square)) / (2 * rms)) if len(square) > 1 else float("nan")
-    return BoundedError(rms, error, bound.rms_m())
+    rms = Measured.root_mean(np.concatenate(squares))
+    return BoundedError(rms.value, rms.stderr, bound.rms_m(), bound.stderr_m())

@@ -1,10 +1,11 @@
-"""Bootstrap intervals over episodes."""
+"""Bootstrap intervals and standard errors over episodes."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from math import floor, isfinite, log10
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -43,6 +44,38 @@ class Summary:
         """A value and the middle 95 % of what resamples gave for it."""
         low, high = np.percentile(resampled, [2.5, 97.5])
         return cls(float(value), float(low), float(high))
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A measured figure and its standard error over episodes; as text "1.23 (0.04)", two digits of the error."""
+
+    value: float
+    stderr: float
+
+    @classmethod
+    def mean(cls, values: np.ndarray) -> Measured:
+        """Of values (episodes,)."""
+        return cls(float(np.mean(values)), float(np.std(values, ddof=1) / len(values) ** 0.5))
+
+    @classmethod
+    def root_mean(cls, squares: np.ndarray) -> Measured:
+        """Root of the mean of squares (episodes,), by the delta method."""
+        mean = cls.mean(squares)
+        root = mean.value**0.5
+        return cls(root, mean.stderr / (2 * root))
+
+    @classmethod
+    def root_ratio(cls, squares: np.ndarray, others: np.ndarray) -> Measured:
+        """Root of the ratio of the means of squares in pairs (episodes,), by the delta method."""
+        ratio = float(np.sqrt(np.mean(squares) / np.mean(others)))
+        return cls(ratio, 0.5 * ratio * cls.mean(squares / np.mean(squares) - others / np.mean(others)).stderr)
+
+    def __str__(self) -> str:
+        if not self.stderr or not isfinite(self.stderr):
+            return f"{self.value:.4g}"
+        digits = max(0, 1 - floor(log10(self.stderr)))
+        return f"{self.value:.{digits}f} ({self.stderr:.{digits}f})"
 
 
 def resampled_means(values: np.ndarray) -> np.ndarray:

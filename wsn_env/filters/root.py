@@ -1,7 +1,8 @@
 """The symmetric square root of a covariance.
 
 It does not depend on the order of the axes: with a permutation M the root of M P M' is M S M'. Cholesky's factor does,
-and so do points spread along its columns.
+and so do points spread along its columns. (It does depend on their units, here m and m/s, where Cholesky's does not.
+The symmetric root of the correlations depends on neither, but its points were worse from a wide prior.)
 """
 
 import numpy as np

@@ -30,4 +30,4 @@ def write_coverage(path: Path, items: Iterable[Item]) -> None:
     """A Markdown table: of the text, where, state."""
     rows = [(item.item, item.where, item.state) for item in items]
     with replacing(path) as temporary:
-        temporary.write_text(markdown_table(("of the text", "where", ""), rows, left=(0, 1, 2)), encoding="utf-8")
+        temporary.write_text(markdown_table(("of the text", "where", "state"), rows, left=(0, 1, 2)), encoding="utf-8")

@@ -8,7 +8,6 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from math import floor, isfinite, log10
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
@@ -17,6 +16,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from wsn_env.evaluation.files import replacing
+from wsn_env.evaluation.intervals import Measured
 from wsn_env.reports.markdown import markdown_table
 from wsn_env.reports.pictures import NEEDED, can_draw
 from wsn_env.reports.tables import wide_console
@@ -118,7 +118,6 @@ def _shown(value: Any, error: float | None) -> str:
     """For people: four digits, or as many as a standard error of two digits leaves."""
     if value is None:
         return "-"
-    if error and isfinite(error):
-        digits = max(0, 1 - floor(log10(error)))
-        return f"{value:.{digits}f} ({error:.{digits}f})"
+    if error:
+        return str(Measured(value, error))
     return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -9,7 +9,7 @@ from wsn_env.evaluation.comparison import Evaluation
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.intervals import Summary
 from wsn_env.reports.markdown import markdown_table
-from wsn_env.simulation.reference import has_reference
+from wsn_env.simulation.reference import has_reference, why_no_reference
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -28,9 +28,7 @@ def describe_reference(evaluation: Evaluation) -> str:
     """What the column of the Cramer-Rao reference holds, in a sentence."""
     all_awake_m = evaluation.reference_all_awake_m()
     if all_awake_m is None:
-        if evaluation.scenario.measurement.lasting_errors:
-            return "no Cramer-Rao reference: the errors of a beacon's levels last over periods"
-        return "no Cramer-Rao reference: a bit that jumps at an edge has no Fisher information"
+        return f"no Cramer-Rao reference: {why_no_reference(evaluation.scenario)}"
     what = "Cramer-Rao recursion on the values of the reports delivered, which an estimate may beat"
     return f"RMS over the {what}; the same for all nodes awake and heard: {all_awake_m:.3f} m"
 

@@ -61,8 +61,8 @@ class Scenario(Section):
         " border nor drawn again to stay inside",
         choices=(True, False),
     )
-    # The hypervolume's reference point: the error of the head alone, the energy of every node within sensing range,
-    # both measured (nearest0; static_cluster or the scenario's own policy) and rounded up past their intervals.
+    # The hypervolume's reference point, above what was measured of the head alone (nearest0) and of the most expensive
+    # competitive policy; it stays as it is when rules get better.
     reference_error_m: float = quantity(1.5, "mean error that a point of a front must stay below", above=0)
     reference_energy_mj: float = quantity(0.4, "energy in a period that it must stay below", above=0)
     field: Field = Field()
@@ -161,6 +161,12 @@ class Scenario(Section):
     def filter_q(self) -> float:
         """The filter's acceleration noise [m/s^2]."""
         return self.motion.fitting_q if self.tracking.filter_q is None else self.tracking.filter_q
+
+    @property
+    def track_q(self) -> float:
+        """The target's own acceleration noise [m/s^2]; the filter's where the motion has none."""
+        own = self.motion.process_noise_ms2
+        return self.filter_q if own is None else own
 
     @cached_property
     def radius_m(self) -> float:

@@ -1,20 +1,17 @@
 """A lower bound on the error of any tracker: the posterior Cramer-Rao bound of a policy in a scenario.
 
-For all that reports can tell and whatever computes with it,
+Whatever computes with all reports that a policy gets,
 
     E |estimate(k) - target(k)|^2  >=  trace of the position part of J(k)^-1
     J(k) = (F J(k-1)^-1 F' + q^2 G G')^-1 + E[sum over the awake nodes of I]
 
-(Tichavsky, Muravchik & Nehorai, 1998, eq. 21), with I the Fisher information of all that an awake node can tell about
-the position: that it detects or keeps silent, and what it then measures (`DetectionRule.information`). The expectation
-is over tracks, fields, noise and, as a policy chooses by what it has heard, schedules; here it is the mean over the
-episodes played. An estimator knows the first belief, so that the mean may be taken along and across its velocity.
+(Tichavsky, Muravchik & Nehorai, 1998, eq. 21), with I the Fisher information of an awake node about the position: of
+whether it detects, and of what it then measures (`DetectionRule.information`). The expectation is over tracks, fields,
+noise and, as a policy chooses by what it has heard, schedules; here it is the mean over the episodes played. Since the
+first belief is known, the mean may be taken along and across its velocity. J(0) is the information of P0 and of the
+start's own covariance together. A lost report counts as if it had arrived: its sender's battery may tell of it later.
 
-It is a bound where the recursion's suppositions are the world's, and only there (`has_bound`): tracks of nearly
-constant velocity from a normal start, never redrawn or reflected; a start known with an error N(0, P0); no search,
-whose choice of a head tells of strengths; reports whose errors are independent, of nodes that detect by a law with a
-slope. J(0) is the information of P0 and of the start's own covariance together. A lost report counts as if it had
-arrived: its sender's battery may tell of it later.
+It is a bound where the recursion's suppositions are the world's, and only there (`why_no_bound`).
 """
 
 from __future__ import annotations
@@ -23,24 +20,36 @@ import numpy as np
 
 from wsn_env.compiled.kernels import lean_kernel, lean_piece, over_rows
 from wsn_env.models.detection.base import information
-from wsn_env.models.measurement.base import node_at
+from wsn_env.models.measurement.base import node_at, value_information
 from wsn_env.models.state import Outcome, State, state_at
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import constants
-from wsn_env.simulation.reference import process_noise, value_information
 
 
-def has_bound(scenario: Scenario) -> bool:
-    """Whether the suppositions of the bound are the scenario's."""
-    tracking, motion = scenario.tracking, scenario.motion
-    own_law = motion.start_sds is not None and motion.process_noise_ms2 is not None
-    reports = scenario.measurement.independent and scenario.detection.regular
-    whole = not scenario.ends_outside  # an episode that ends early leaves the mean over the horizon open
-    return reports and whole and own_law and tracking.start == "known" and not tracking.search
+def why_no_bound(scenario: Scenario) -> str | None:
+    """What of a scenario leaves it without a bound, and what is allowed; None: it has one."""
+    motion, detection, measurement = scenario.motion, scenario.detection, scenario.measurement
+    if motion.start_sds is None or motion.process_noise_ms2 is None or motion.bounded:
+        return f"Scenario.motion = {type(motion).__name__}: its law is not normal; allowed is motion='free'"
+    if not measurement.gaussian:
+        kind = type(measurement).__name__
+        return f"Scenario.measurement = {kind}: its noise is not normal and constant; allowed are others"
+    if not detection.regular:
+        return f"Scenario.detection = {detection}: its probability jumps at an edge; allowed is a softer one"
+    if scenario.tracking.start != "known":
+        return f"Tracking.start = {scenario.tracking.start!r}: allowed is 'known', whose error is normal"
+    if scenario.tracking.search:
+        return "Tracking.search = True: the choice of a head tells of strengths; allowed is False"
+    if scenario.ends_outside or scenario.unscored:
+        return "Scenario.ends_outside, unscored: the mean is over the whole horizon; allowed are False and 0"
+    return None
 
 
 class Bound:
-    """The bound of a policy, from the episodes that it plays: `begin` and `advance` as they go, then `rms_m`."""
+    """The bound of a policy, from the episodes that it plays: `begin` and `advance` as they go, then `rms_m`.
+
+    Every `begin` starts a block of episodes; between blocks the standard error is estimated.
+    """
 
     def __init__(self, scenario: Scenario, threads: int = 1) -> None:
         """Prepare.
@@ -48,48 +57,68 @@ class Bound:
         Raises:
             ValueError: where it would be no bound.
         """
-        if not has_bound(scenario):
-            raise ValueError(
-                f"scenario = {scenario.name}, motion {type(scenario.motion).__name__}: has no bound; allowed are"
-                " a motion with a normal start (motion='free'), start='known', search=False and a measurement whose"
-                " errors are independent"
-            )
+        if why := why_no_bound(scenario):
+            raise ValueError(why)
         self._scenario, self._constants, self._threads = scenario, constants(scenario), threads
-        self._sums = np.zeros((scenario.periods, 3))  # of information along, across and along times across [1/m^2]
-        self._episodes = 0
+        self._sums: list[
+            np.ndarray
+        ] = []  # by block: (periods, 3) information along, across, along times across [1/m^2]
+        self._episodes: list[int] = []  # by block
 
     def begin(self, state: State) -> None:
         """New episodes, in period 0."""
         velocity = state.belief.row["mean"][:, [1, 3]]
         self._along = velocity / np.maximum(np.hypot(*velocity.T), 1e-12)[:, None]
-        self._episodes += state.rows
+        self._episodes.append(state.rows)
+        self._sums.append(np.zeros((self._scenario.periods, 3)))
 
     def advance(self, state: State, outcome: Outcome) -> None:
-        """One period of all of them; `state` is that after it."""
+        """One period of all of them; `state` is that after it.
+
+        Raises:
+            ValueError: when a node has died: who was awake is then no longer known.
+        """
+        if (outcome.alive < self._scenario.field.nodes).any():
+            battery = self._scenario.radio.battery_j
+            raise ValueError(f"Link.battery_j = {battery}: a node died; the bound needs batteries that last")
         found = np.empty((state.rows, 3))
         args = self._constants, outcome.row, state.handle, self._along, found
         over_rows(_information_of_awake, state.rows, self._threads, *args)
-        self._sums[state.row["period"][0] - 1] += found.sum(axis=0)
+        self._sums[-1][state.row["period"][0] - 1] += found.sum(axis=0)
 
     def per_period_m(self) -> np.ndarray:
         """(periods,) root of the least mean square error in each period [m]."""
-        t, q = self._scenario.period_s, process_noise(self._scenario)
+        return self._recursion(np.sum(self._sums, axis=0) / sum(self._episodes))
+
+    def rms_m(self) -> float:
+        """Root mean square over the periods [m]: no tracker's root mean square error is lower."""
+        return float(np.sqrt(np.mean(self.per_period_m() ** 2)))
+
+    def stderr_m(self) -> float:
+        """Standard error of `rms_m`, by leaving out one block after the other; NaN with a single block [m]."""
+        blocks, whole, episodes = len(self._sums), np.sum(self._sums, axis=0), sum(self._episodes)
+        rest = [
+            np.sqrt(np.mean(self._recursion((whole - own) / (episodes - count)) ** 2))
+            for own, count in zip(self._sums, self._episodes, strict=True)
+            if episodes > count
+        ]
+        return float(np.sqrt((blocks - 1) * np.var(rest))) if len(rest) > 1 else float("nan")
+
+    def _recursion(self, informations: np.ndarray) -> np.ndarray:
+        """(periods,) with these mean informations (periods, 3)."""
+        t, q = self._scenario.period_s, self._scenario.track_q
         f, g = np.kron(np.eye(2), [[1.0, t], [0.0, 1.0]]), np.kron(np.eye(2), [[t * t / 2], [t]])
         tracking, own = self._scenario.tracking, self._scenario.motion.start_sds
         sds = np.array([[tracking.start_sd_m, tracking.start_sd_ms], own])
         cov = np.diag(np.tile(1.0 / (sds**-2.0).sum(axis=0), 2))
         squares = []
-        for along, across, both in self._sums / self._episodes:
+        for along, across, both in informations:
             cov = f @ cov @ f.T + q * q * (g @ g.T)
-            told = np.zeros((4, 4))
-            told[np.ix_([0, 2], [0, 2])] = (along, both), (both, across)
-            cov = np.linalg.solve(np.eye(4) + cov @ told, cov)
+            found = np.zeros((4, 4))
+            found[np.ix_([0, 2], [0, 2])] = (along, both), (both, across)
+            cov = np.linalg.solve(np.eye(4) + cov @ found, cov)
             squares.append(cov[0, 0] + cov[2, 2])
         return np.sqrt(squares)
-
-    def rms_m(self) -> float:
-        """Root mean square over the periods [m]: no tracker's root mean square error is lower."""
-        return float(np.sqrt(np.mean(self.per_period_m() ** 2)))
 
 
 @lean_kernel
@@ -102,7 +131,7 @@ def _information_of_awake(start, stop, cs, outcomes, handle, along, found):
         for i in range(-1, network.row[b].n_members):
             node = network.members[b, i] if i >= 0 else network.row[b].head
             if node >= 0:
-                one = _information_of(node_at(network.positions[b], node), x, y, c)
+                one = _information_of_node(node_at(network.positions[b], node), x, y, c)
                 xx, xy, yy = xx + one[0], xy + one[1], yy + one[2]
         s, t = along[b]
         found[b, 0] = s * s * xx + 2.0 * s * t * xy + t * t * yy
@@ -111,11 +140,11 @@ def _information_of_awake(start, stop, cs, outcomes, handle, along, found):
 
 
 @lean_piece
-def _information_of(node, x, y, c):
+def _information_of_node(node, x, y, c):
     """xx, xy and yy of an awake node [1/m^2]."""
     dx, dy = x - node.x, y - node.y
     squared = max(dx * dx + dy * dy, 1e-12)
-    share, along = information(c.detection, c.measurement, np.sqrt(squared))
-    xx, xy, yy = value_information(node, x, y, c)
-    sight = along / squared
-    return share * xx + sight * dx * dx, share * xy + sight * dx * dy, share * yy + sight * dy * dy
+    value, radial = information(c.detection, c.measurement, np.sqrt(squared))
+    xx, xy, yy = value_information(c.measurement, node, x, y)
+    radial /= squared
+    return value * xx + radial * dx * dx, value * xy + radial * dx * dy, value * yy + radial * dy * dy

@@ -16,14 +16,12 @@ arrives. It depends on field, track and key alone, so that it is one number an e
 Both are made of the truth: for loggers and tables, never for policies.
 """
 
-from typing import Any
-
 import numpy as np
 
 from wsn_env.compiled.arrays import record
 from wsn_env.compiled.kernels import Pinned, lean_kernel, lean_piece, over_rows, threads_for
 from wsn_env.models.detection.base import detects, stream_of
-from wsn_env.models.measurement.base import at_point, linearise, node_at
+from wsn_env.models.measurement.base import node_at, value_information
 from wsn_env.models.motion.prediction import predict_covariance
 from wsn_env.models.state import Outcome, State, state_at
 from wsn_env.scenario import Scenario
@@ -41,16 +39,23 @@ MEMORY = record(
 )
 
 
+def why_no_reference(scenario: Scenario) -> str | None:
+    """What of a scenario leaves it without a reference, and what is allowed; None: it has one."""
+    measurement = scenario.measurement
+    if measurement.reports_state:
+        why = "a bit that jumps at an edge has no Fisher information"
+    elif measurement.lasting_errors:
+        why = "the errors of its levels last over periods"
+    elif scenario.ends_outside:
+        return "Scenario.ends_outside = True: episodes end before the horizon that the mean is over; allowed is False"
+    else:
+        return None
+    return f"Scenario.measurement = {type(measurement).__name__}: {why}; allowed are reports with errors of their own"
+
+
 def has_reference(scenario: Scenario) -> bool:
-    """Whether reports have Fisher information and errors that do not last over periods: no binary sensors, whose bit
-    jumps at an edge, and no beacon's levels. Nor where episodes end before the horizon that the mean is over."""
-    return scenario.measurement.independent and not scenario.ends_outside
-
-
-def process_noise(scenario: Scenario) -> float:
-    """sd of the target's own white acceleration [m/s^2]; the filter's where the motion has none."""
-    own = scenario.motion.process_noise_ms2
-    return scenario.filter_q if own is None else own
+    """Whether there is one."""
+    return why_no_reference(scenario) is None
 
 
 class Reference:
@@ -67,12 +72,11 @@ class Reference:
             rows: B.
             threads: at most so many share the work. No bit depends on it.
         """
-        if not has_reference(scenario):
-            kind = type(scenario.measurement).__name__
-            raise ValueError(f"Scenario.measurement = {kind}: has no Fisher information; allowed are all others")
+        if why := why_no_reference(scenario):
+            raise ValueError(why)
         self._periods, self._threads = scenario.periods, threads
         self._constants, self._start = constants(scenario), start_record(scenario)
-        self._constants["tracking"]["q"] = process_noise(scenario)
+        self._constants["tracking"]["q"] = scenario.track_q
         if scenario.detection.values_decide:
             self._constants["reach_m"] = np.inf  # noise lifts a level over the threshold from anywhere
         self._memory, self._advance = np.zeros(rows, MEMORY), Pinned(_advance)
@@ -185,23 +189,11 @@ def _take_period(own, xx, xy, yy, c):
 
 
 @lean_piece
-def value_information(node: Any, x: float, y: float, c: Any) -> tuple[float, float, float]:
-    """H' R^-1 H of one report about the position: its xx, xy and yy [1/m^2]."""
-    xx, xy, yy = 0.0, 0.0, 0.0
-    for line in linearise(c.measurement, node, at_point(x, y)):
-        weight = 1.0 / line.variance
-        xx += weight * line.slope_x * line.slope_x
-        xy += weight * line.slope_x * line.slope_y
-        yy += weight * line.slope_y * line.slope_y
-    return xx, xy, yy
-
-
-@lean_piece
 def _information_of(nodes, positions, x, y, c):
     """Of the period's reports."""
     xx, xy, yy = 0.0, 0.0, 0.0
     for node in nodes:
-        one = value_information(node_at(positions, node), x, y, c)
+        one = value_information(c.measurement, node_at(positions, node), x, y)
         xx, xy, yy = xx + one[0], xy + one[1], yy + one[2]
     return xx, xy, yy
 
@@ -219,7 +211,7 @@ def _information_of_all(state, b, period, c):
             node = grid.nodes[b, slot]
             placed = node_at(positions, node)
             if detects(c.detection, c.measurement, stream, placed, x, y):
-                one = value_information(placed, x, y, c)
+                one = value_information(c.measurement, placed, x, y)
                 xx, xy, yy = xx + one[0], xy + one[1], yy + one[2]
     return xx, xy, yy
 

@@ -44,8 +44,12 @@ class DetectionRule(Kind):
         "known_radius",
     )
 
-    regular: ClassVar[bool] = True  # whether p(d) has a slope everywhere and every period draws anew, for the bound
     values_decide: ClassVar[bool] = False  # whether the measured value decides, so that detecting tells of the value
+
+    @property
+    def regular(self) -> bool:
+        """Whether p(d) has a derivative everywhere and every period draws anew, as the bound supposes."""
+        return False
 
     def check(self, scenario: Scenario) -> None:
         """Raise ScenarioError where it does not fit the rest of the scenario."""
@@ -114,10 +118,10 @@ class DetectionRule(Kind):
 
     @staticmethod
     def information(d: Any, m: Any, distance: float) -> tuple[float, float]:
-        """Fisher information about the target of all that an awake node can tell, value and silence alike.
+        """Fisher information about the target of an awake node's detection or silence, and of its value.
 
-        Returns: what share of the value's information H' R^-1 H a node tells on average; and beside it, along the line
-            of sight [1/m^2], what it tells by detecting or not. Here p and p'^2 / (p (1 - p)).
+        Returns: the mean of the value's information in units of its H' R^-1 H; and along the line of sight [1/m^2] the
+            information of whether it detects. Here p and p'^2 / (p (1 - p)).
         """
         p, step = probability(d, m, distance), min(STEP * d.radius_m, 0.5 * distance)
         change = probability(d, m, distance + step) - probability(d, m, distance - step)

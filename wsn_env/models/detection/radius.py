@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 SHARPEST = 1e-6  # m^(2/3): an edge without width would divide by it
 LOG_LEAST, LOG_MOST = F(-13.815510558), F(-1.0000005e-6)  # p in [1e-6, 1 - 1e-6]: no report rules a particle out
 TINY = F(1e-30)
+LEAST_SOFT = 0.05  # of an edge whose information a mean over episodes meets
 
 
 @lean_piece
@@ -67,6 +68,11 @@ class Detection(DetectionRule):
     edge_power: float = quantity(2.0, "beta2", above=0)
 
     allocates: ClassVar[bool] = False
+
+    @property
+    def regular(self) -> bool:
+        """Not where the edge is all but a jump."""
+        return self.decay > 0 and self.softness >= LEAST_SOFT and self.decay_power > 1
 
     @property
     def reach_m(self) -> float:

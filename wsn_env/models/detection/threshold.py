@@ -36,6 +36,11 @@ class Threshold(DetectionRule):
     allocates: ClassVar[bool] = False
     values_decide: ClassVar[bool] = True
 
+    @property
+    def regular(self) -> bool:
+        """The level's noise makes it so."""
+        return True
+
     def check(self, scenario: Scenario) -> None:
         """Raise ScenarioError unless the mean level falls to the threshold somewhere."""
         self._check_levels(scenario.measurement)

@@ -37,7 +37,6 @@ class UnequalRadii(DetectionRule):
     )
 
     allocates: ClassVar[bool] = False
-    regular: ClassVar[bool] = False
 
     def check(self, scenario: Scenario) -> None:
         """Only what reads states makes use of radii."""

@@ -120,6 +120,8 @@ class Measurement(Kind):
     equal_everywhere: ClassVar[bool] = False  # whether a report tells the same wherever its node stands
     reports_state: ClassVar[bool] = False  # whether nodes remember a state and report how it stands, so that silence
     # tells as much as a report
+    gaussian: ClassVar[bool] = False  # whether noise is normal, of constant variance, and `linearise` exact at a point:
+    # then H' R^-1 H is all of a value's Fisher information, as the bound needs it
     lasting_errors: ClassVar[bool] = False  # whether errors are alike from period to period, so that silence tells
     # nothing and a tracker has to learn them
     order: ClassVar[Order] = "information"  # the menu's order of merit that suits it
@@ -337,6 +339,18 @@ def level(m: Any, squared: float) -> Any:
 @by_kind
 def level_slope(m: Any, squared: float) -> Any:
     """Its derivative by the distance, over the distance [dB/m^2]; times (dx, dy), its gradient."""
+
+
+@lean_piece
+def value_information(m: Any, node: Any, x: float, y: float) -> tuple[float, float, float]:
+    """H' R^-1 H of a report's value about a target at (x, y): its xx, xy and yy [1/m^2]."""
+    xx, xy, yy = 0.0, 0.0, 0.0
+    for line in linearise(m, node, at_point(x, y)):
+        weight = 1.0 / line.variance
+        xx += weight * line.slope_x * line.slope_x
+        xy += weight * line.slope_x * line.slope_y
+        yy += weight * line.slope_y * line.slope_y
+    return xx, xy, yy
 
 
 weigh: Any = by_kind(Measurement.weigh)

@@ -41,6 +41,7 @@ class Level(Measurement):
         absorption_db_per_m: ClassVar[float] = 0.0
     abstract: ClassVar[bool] = True
     allocates: ClassVar[bool] = False
+    gaussian: ClassVar[bool] = True
 
     @property
     def at_1m_db(self) -> float:

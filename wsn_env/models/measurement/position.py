@@ -23,6 +23,7 @@ class Position(Measurement):
     noise_m: float = quantity(2.0, "sd of each coordinate", above=0)
 
     allocates: ClassVar[bool] = False
+    gaussian: ClassVar[bool] = True
     values: ClassVar[int] = 2
     equal_everywhere: ClassVar[bool] = True
     order: ClassVar[Order] = "nearest"

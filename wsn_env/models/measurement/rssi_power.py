@@ -34,6 +34,7 @@ class RssiPower(Measurement):
     floor_m: float = quantity(1.0, "nearer than this the power grows no more", above=0)
 
     allocates: ClassVar[bool] = False
+    gaussian: ClassVar[bool] = True
 
     @property
     def fingerprint_unit(self) -> float:

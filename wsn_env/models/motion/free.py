@@ -19,8 +19,8 @@ class Free(Motion):
 
         x(0) ~ N(middle, spread_m^2), v(0) ~ N(0, speed_ms^2) along each axis; x(k+1) = F x(k) + G a, a ~ N(0, q^2)
 
-    The law of the track is exactly the one that the filter's model and the Cramer-Rao bound suppose: nothing is drawn
-    again or reflected.
+    Nothing is drawn again or reflected: the law of the track is the one that the Cramer-Rao bound supposes, and with
+    filter_q = acceleration_ms2 the filter's.
     """
 
     allocates: ClassVar[bool] = False

@@ -3,7 +3,7 @@
 The target carries a receiver and listens to some of 8 anchors on a ring of 200 m x 200 m; every beacon that it hears
 costs its sender 128 bits (eq. 5). Levels fall with exponent 3, noise 3 dB. Episodes last 50 periods.
 
-What matters: which anchors. Two that stand well cost a twelfth of all eight, for an error that is a third larger.
+What matters: which anchors. Two that stand well cost an eleventh of all eight, for an error a third larger.
 """
 
 from wsn_env.models.detection.radius import Detection
