@@ -16,7 +16,7 @@ from pathlib import Path
 import tyro
 
 from wsn_env.models.recordings.dataset import Track, read_dataset
-from wsn_env.models.recordings.receivers import DatasetError
+from wsn_env.models.recordings.files import DatasetError
 
 
 @dataclass
@@ -45,7 +45,7 @@ def main() -> int:
             with open(settings.out / f"{track.name}.csv", "w", newline="") as file:
                 csv.writer(file).writerows([("t", "x", "y"), *points])
             print(f"{track.name}: {len(points)} positions in {points[-1][0]:.0f} s")
-    except DatasetError as problem:
+    except (DatasetError, OSError) as problem:
         print(f"ble_tracks.py: {problem}", file=sys.stderr)
         return 2
     return 0

@@ -1,8 +1,10 @@
 """Recorded Bluetooth tracks: every line is kept or counted, every error names its place; WSN_BLE_DIR names the real."""
 
+import datetime
 import os
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -28,11 +30,13 @@ from wsn_env.models.recordings.dataset import (
     read_track,
     track_files,
 )
-from wsn_env.models.recordings.receivers import DatasetError, Receivers, read_receivers
+from wsn_env.models.recordings.files import DatasetError, DatasetWarning
+from wsn_env.models.recordings.receivers import OUTSIDE_M, Receivers, in_room, read_receivers
 
 FOLDER = os.environ.get("WSN_BLE_DIR")
 ROOT = Path(__file__).parents[1]
 COPIES = 1000
+pytestmark = pytest.mark.filterwarnings("ignore::wsn_env.models.recordings.files.DatasetWarning")
 TIME, RECEIVER, BEACON_ID, LEVEL, X, Y, Z = range(7)
 
 
@@ -252,7 +256,8 @@ def test_the_beacon_is_a_named_one_or_the_most_frequent(folder):
         ([packet(1, x=99)], r"line 1: impossible position: \(99, 4, 1.8\) m .* 20.66 x 17.64 m"),
         ([packet(1)], "its 1 usable packets of 1 lines last 0 s: must be at least 1 s$"),
         ([packet(1), b"x", packet(1.9)], "2 usable packets of 3 lines last 0.9 s: .*; line 2: malformed"),
-        ([packet(100 * k) for k in range(5)], "its 1 usable packets of 5"),
+        ([packet(100 * k) for k in range(5)], "times must be in seconds, and look like ms: .* 100 s apart"),
+        ([packet(100 * k, NAMES[k]) for k in range(5)], "its 1 usable packets of 5"),
     ],
 )
 def test_a_file_without_a_track(folder, lines, why):
@@ -323,6 +328,115 @@ def test_missing_files(tmp_path, clean):
         read_track(tmp_path / "walk.mbd")
     with pytest.raises(DatasetError, match="cannot be read: Is a directory"):
         read_track(tmp_path, read_receivers(clean.parent))
+
+
+# --- units of time ------------------------------------------------------------------------------------------
+
+
+def in_unit(line: bytes, of_time) -> bytes:
+    return changed(line, TIME, of_time(float(line.split(b",")[TIME])))
+
+
+@pytest.mark.parametrize("unit, seconds", [("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("min", 60), ("h", 3600)])
+@pytest.mark.parametrize("start_s", [0.0, 1.6e9])
+@pytest.mark.parametrize("share", [1.0, 0.5, 0.2])
+def test_times_in_another_unit_are_refused_by_its_name(clean, folder, unit, seconds, start_s, share):
+    """All of them, or a part, as where two recorders were joined; the longest silences of a file in seconds are few."""
+    if seconds > 1 and share < 1:
+        pytest.skip("a part in a longer unit lies years off: astray")
+    lines = clean.read_bytes().splitlines()
+    every = round(1 / share)
+    for k, line in enumerate(lines):
+        length_s = seconds if k % every == 0 else 1
+        lines[k] = changed(line, TIME, repr((float(line.split(b",")[TIME]) - 1.6e9 + start_s) / length_s))
+    with pytest.raises(DatasetError, match=rf"own\.mbd: times must be in seconds, and look like {unit}: a receiver's"):
+        read(folder, lines)
+
+
+def test_dates_are_refused(clean, folder):
+    lines = clean.read_bytes().splitlines()
+
+    def iso(s):
+        return datetime.datetime.fromtimestamp(s, datetime.UTC).isoformat()
+
+    for write in (iso, lambda s: iso(s).replace("T", " "), lambda s: iso(s)[11:23], lambda s: iso(s)[:10]):
+        with pytest.raises(DatasetError, match="line 1: malformed: '.*' is not a number: a date must be given in sec"):
+            read(folder, [in_unit(line, write) for line in lines])
+
+
+def test_whole_seconds_are_told(clean, folder):
+    lines = [in_unit(line, int) for line in clean.read_bytes().splitlines()]
+    with pytest.warns(DatasetWarning, match=r"own\.mbd: \d+ of \d+ lines .* repeated packet; times .* whole seconds"):
+        track = read(folder, lines)
+    assert 0.3 < track.counts["repeated packet"] / track.counts["lines"] < 0.6
+    tenths = read(folder, [in_unit(line, lambda s: f"{s:.1f}") for line in clean.read_bytes().splitlines()])
+    assert tenths.note is None and tenths.counts["repeated packet"] < 10
+
+
+def test_packets_on_three_channels_and_pauses_are_in_seconds(folder):
+    heard = [k / 10 + channel / 500 for k in range(200) for channel in range(3)]
+    assert read(folder, map(packet, heard)).counts["kept"] == 600
+    parts = [second + pause for pause in (0, 3600, 90_000) for second in range(20)]
+    assert read(folder, map(packet, parts)).counts["astray time"] == 40
+
+
+# --- files of which a part is used --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("fault", ["cut", "receiver", "beacon", "loud", "left", "early", "spaces"])
+def test_more_than_a_tenth_left_out_is_told(clean, folder, fault):
+    damage, reason = FAULTS[fault]
+    lines = clean.read_bytes().splitlines()
+    few, many = len(lines) // 10, len(lines) // 10 + 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert read(folder, [*map(damage, lines[:few]), *lines[few:]]).note is None
+    with pytest.warns(DatasetWarning) as told:
+        track = read(folder, [*map(damage, lines[:many]), *lines[many:]])
+    kept = len(lines) - many
+    assert track.note == f"{folder / 'own.mbd'}: {kept} of {len(lines)} lines are used; left out: {many} {reason}"
+    assert [str(one.message) for one in told] == [track.note]
+
+
+# --- what cannot be a file ----------------------------------------------------------------------------------
+
+
+def test_pipes_devices_and_endless_files_are_not_read(tmp_path, clean):
+    receivers = read_receivers(clean.parent)
+    os.mkfifo(tmp_path / "pipe.mbd")
+    with open(tmp_path / "endless.mbd", "wb") as file:
+        file.truncate(2**40)
+    for path, why in (
+        (tmp_path / "pipe.mbd", "is a pipe or a device"),
+        (Path("/dev/zero"), "is a pipe or a device"),
+        (tmp_path / "endless.mbd", f"has {2**40} bytes: at most"),
+    ):
+        with pytest.raises(DatasetError, match=f"{path}: cannot be read: {why}"):
+            read_track(path, receivers)
+
+
+def test_two_files_of_one_tracks_name_are_refused(tmp_path):
+    (path,) = track_files(write_dataset(tmp_path, tracks=1, seconds=3))
+    path.with_name("walk_0.mbd").write_bytes(path.read_bytes())
+    with pytest.raises(DatasetError, match="walk_0.mbd, walk_0_all_sensors.mbd: are 2 files of one track's name"):
+        track_files(tmp_path)
+
+
+# --- the room -----------------------------------------------------------------------------------------------
+
+
+def test_a_room_holds_its_receivers(folder):
+    (folder / "tetam.par").write_text('{"limits": [0, 0, 17.6, 17.0]}')  # receivers up to .99 and .11 m outside
+    far = receiver_positions()[:, :2].max(axis=0)
+    assert read_receivers(folder).limits_m == (max(17.6, far[0]), max(17.0, far[1]))
+
+
+def test_one_rule_says_how_far_outside_counts():
+    room = 20.0, 10.0
+    edge = OUTSIDE_M + 1e-9
+    assert in_room(np.array([-1.0, 21.0, 5.0]), np.array([11.0, -1.0, 5.0]), room).all()
+    for x, y in ((-edge, 5), (20 + edge, 5), (5, -edge), (5, 10 + edge), (5, 19), (np.nan, 5)):
+        assert not in_room(x, y, room)
 
 
 # --- periods ------------------------------------------------------------------------------------------------

@@ -5,7 +5,9 @@ from __future__ import annotations
 import sys
 import time
 import traceback
-from collections.abc import Callable, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -14,6 +16,7 @@ import tyro
 
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.models.quantity import parse_overrides
+from wsn_env.models.recordings.files import DatasetWarning
 from wsn_env.scenario import Scenario
 
 
@@ -113,7 +116,8 @@ def main(arguments: list[str] | None = None) -> int:
     commands: dict[str, Callable[..., Any]] = {kind.__name__.lower(): kind for kind in runs}
     command = tyro.extras.subcommand_cli_from_dict(commands, prog="wsn", args=arguments)
     try:
-        runs[type(command)](command)
+        with warnings_on_one_line():
+            runs[type(command)](command)
     except (ValueError, OSError, MemoryError) as problem:
         print(f"wsn: {user_code_location(problem)}{problem}", file=sys.stderr)
         return 2
@@ -122,6 +126,22 @@ def main(arguments: list[str] | None = None) -> int:
         print("wsn: stopped" + ("; the same command continues where it was" if kept else ""), file=sys.stderr)
         return 130
     return 0
+
+
+@contextmanager
+def warnings_on_one_line() -> Iterator[None]:
+    """What a recording must say is a line on stderr, above the table; other warnings are shown as ever."""
+    with warnings.catch_warnings():
+        others = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *place: Any) -> None:
+            if issubclass(category, DatasetWarning):
+                print(f"wsn: {message}", file=sys.stderr)
+            else:
+                others(message, category, *place)
+
+        warnings.showwarning = show  # type: ignore[assignment]
+        yield
 
 
 def user_code_location(problem: Exception) -> str:

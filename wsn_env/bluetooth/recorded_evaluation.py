@@ -24,7 +24,7 @@ from wsn_env.evaluation.rollout import Engine
 from wsn_env.evaluation.versions import versions
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.models.recordings.dataset import read_dataset, track_files, track_name
-from wsn_env.models.recordings.receivers import DatasetError
+from wsn_env.models.recordings.files import DatasetError
 from wsn_env.scenario import Scenario
 
 
@@ -33,6 +33,7 @@ class RecordedEvaluation:
     """Evaluations by track, of the same policies, lams and seeds."""
 
     by_track: dict[str, Evaluation]
+    notes: tuple[str, ...] = ()  # what must be said of the files, see `Track.note`
 
     @property
     def first(self) -> Evaluation:
@@ -120,7 +121,8 @@ def evaluate_recorded(  # noqa: PLR0913
             raise ValueError(
                 f"{folder}: holds one track: leaving it out leaves none to calibrate on (give calibration=)"
             )
-        tracks = read_dataset(folder)
+    tracks = read_dataset(folder)
+    if not calibrated:
         for track, without in zip(tracks, leave_one_out(tracks)):
             scenarios[track.name] = scenario.override(**without.quantities)
     evaluations = {}
@@ -135,7 +137,7 @@ def evaluate_recorded(  # noqa: PLR0913
             progress=progress and _progress_of_track(progress, number, len(paths), name),
             engine=engine,
         )
-    return RecordedEvaluation(evaluations)
+    return RecordedEvaluation(evaluations, tuple(track.note for track in tracks if track.note))
 
 
 def insert_track_name(policies: Sequence[str], track: str) -> list[str]:

@@ -73,8 +73,8 @@ def print_recorded_tables(evaluation: RecordedEvaluation) -> None:
 
 
 def recorded_markdown(evaluation: RecordedEvaluation) -> str:
-    """The same as Markdown."""
-    parts = []
+    """The same as Markdown, below what must be said of the files."""
+    parts = list(evaluation.notes)
     for lam in evaluation.first.lams:
         header, rows = recorded_rows(evaluation, lam)
         title = f"## {evaluation.description}, lam = {lam:g} m/mJ\n"

@@ -8,26 +8,33 @@ position annotation", Pervasive and Mobile Computing 81, 2022. A folder holds
     tetam.par    {"limits": [0, 0, width, depth], ...}; it may be absent
     *.mbd        a packet a line: timestamp [s], receiver, beacon, level [dBm], x, y, z [m], orientation (3 x 3)
 
-Recordings have faults. A line that cannot be used is left out and counted by its reason; a file that cannot be used
-raises `DatasetError`.
+Recordings have faults. A line that cannot be used is left out and counted by its reason; more than a tenth of them is a
+`DatasetWarning`. A file that cannot be used, or whose times are not in seconds, raises `DatasetError`.
 """
 
 from __future__ import annotations
 
+import warnings
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from wsn_env.models.quantity import check_quantity
+from wsn_env.models.recordings.files import DatasetError, DatasetWarning, read_file
 from wsn_env.models.recordings.lines import FAULTS, read_packets
-from wsn_env.models.recordings.receivers import DEVICES, DatasetError, Receivers, read_file, read_receivers
+from wsn_env.models.recordings.receivers import DEVICES, Receivers, read_receivers
 
 ENDINGS = ("_all_sensors.mbd", ".mbd")  # of a track's file, left out of its name
 ASTRAY_S = 60.0  # a longer silence parts a track; its longest part is kept
 GAP_S = 1.0  # a longer silence is counted as a gap: two advertisements that nobody heard
 REPEAT_S = 0.5e-3  # a packet is on air for .4 ms: a receiver cannot hear two within less
 SHORTEST_S = 1.0  # of a track
+SPACING_S = 0.02, 20.0  # of a receiver's packets, pauses aside: a beacon advertises every 20 ms to 10.24 s
+FEWEST_GAPS = 10  # that show that they are too near
+UNITS_S = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "days": 86400.0}
+TOLD_SHARE = 0.1  # of a file: more than that is not left out without a word
 FINEST_S = 0.01  # of the periods that a track is cut into
 
 ASTRAY, REPEATED = "astray time", "repeated packet"
@@ -69,6 +76,18 @@ class Track:
     def longest_gap_s(self) -> float:
         """The longest silence of all receivers."""
         return float(np.diff(self.time_s).max(initial=0.0))
+
+    @property
+    def note(self) -> str | None:
+        """What must be said of a file of which more than a tenth is left out."""
+        lines, kept = (self.counts.get(name, 0) for name in ("lines", "kept"))
+        if lines - kept <= TOLD_SHARE * lines:
+            return None
+        reasons = Counter({reason: self.counts[reason] for reason in REASONS}).most_common()
+        left_out = ", ".join(f"{count} {reason}" for reason, count in reasons if count)
+        whole = "; times are in whole seconds, within which a receiver's packets count as one"
+        rounded = self.counts[REPEATED] and not (self.time_s % 1).any()
+        return f"{self.path}: {kept} of {lines} lines are used; left out: {left_out}{whole if rounded else ''}"
 
     def per_period(self, period_s: float = 1.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What was heard in each of the K whole periods; period k holds the packets of [k T, (k + 1) T).
@@ -114,7 +133,7 @@ def track_files(folder: str | Path) -> list[Path]:
     """Its *.mbd files, sorted by name.
 
     Raises:
-        DatasetError: there is none, or no such folder.
+        DatasetError: there is none, no such folder, or two are called alike.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -122,6 +141,10 @@ def track_files(folder: str | Path) -> list[Path]:
     files = sorted(path for path in folder.glob("*.mbd") if path.is_file() and not path.name.startswith("."))
     if not files:
         raise DatasetError(f"{folder}: holds no *.mbd file")
+    for name, times in Counter(map(track_name, files)).items():
+        if times > 1:
+            twice = ", ".join(path.name for path in files if track_name(path) == name)
+            raise DatasetError(f"{folder}: {twice}: are {times} files of one track's name, {name}")
     return files
 
 
@@ -135,7 +158,8 @@ def read_track(path: str | Path, receivers: Receivers | None = None) -> Track:
         receivers: those of its folder unless given.
 
     Raises:
-        DatasetError: names the file, the line and what is wrong; no line can be used, or less than `SHORTEST_S`.
+        DatasetError: names the file, the line and what is wrong; no line can be used, less than `SHORTEST_S`, or times
+            that are not in seconds.
     """
     path = Path(path)
     lines = read_file(path).splitlines()
@@ -148,6 +172,7 @@ def read_track(path: str | Path, receivers: Receivers | None = None) -> Track:
     if not len(packets):
         raise DatasetError(f"{path}: none of its {len(lines)} lines is a packet that can be used{first}")
 
+    _check_unit(path, packets[:, 0], places)
     kept = _longest_run(packets[:, 0])
     counts[ASTRAY] = int((~kept).sum())
     packets, places = packets[kept], places[kept]
@@ -168,13 +193,36 @@ def read_track(path: str | Path, receivers: Receivers | None = None) -> Track:
     arrays = time, places, packets[:, 1].copy(), packets[:, 2:].copy()
     for array in arrays:
         array.setflags(write=False)
-    return Track(track_name(path), path, receivers, *arrays, counts, int(earlier.sum()))
+    track = Track(track_name(path), path, receivers, *arrays, counts, int(earlier.sum()))
+    if track.note:
+        warnings.warn(track.note, DatasetWarning, stacklevel=1)  # from here: said once, whoever reads it again
+    return track
 
 
 def track_name(path: Path) -> str:
     """What a track's file is called, without its endings."""
     ending = next((ending for ending in ENDINGS if path.name.endswith(ending)), "")
     return path.name.removesuffix(ending)
+
+
+def _check_unit(path: Path, time: np.ndarray, places: np.ndarray) -> None:
+    """Raise DatasetError unless times (N,) are spaced as packets are, at the receivers (N,), in seconds.
+
+    A receiver's packets are a few advertising intervals apart, but for pauses, which are the longest tenth at most. A
+    few that are too near may be one packet on several channels.
+    """
+    order = np.lexsort((time, places))
+    with np.errstate(over="ignore"):
+        gaps = np.sort(np.diff(time[order])[np.diff(places[order]) == 0])
+        usual = gaps[: len(gaps) - -(-len(gaps) // 10)]
+        spacing = usual.mean() if len(usual) else 0.0
+    low, high = SPACING_S
+    if low <= spacing <= high or spacing == 0 or (spacing < low and len(usual) < FEWEST_GAPS):
+        return
+    like = [f", and look like {unit}" for unit, seconds in UNITS_S.items() if low <= spacing * seconds <= high]
+    raise DatasetError(
+        f"{path}: times must be in seconds{''.join(like[:1])}: a receiver's packets would be {spacing:.3g} s apart"
+    )
 
 
 def _longest_run(time: np.ndarray) -> np.ndarray:

@@ -7,7 +7,8 @@ from collections import Counter
 
 import numpy as np
 
-from wsn_env.models.recordings.receivers import DEVICES, OUTSIDE_M, Receivers
+from wsn_env.models.recordings.files import parse_number, shown
+from wsn_env.models.recordings.receivers import DEVICES, Receivers, in_room
 
 FIELDS = 16  # in a line
 LEVELS_DB = (-120.0, -20.0)  # a level lies between them
@@ -49,7 +50,7 @@ def read_packets(lines: list[bytes], receivers: Receivers) -> tuple[np.ndarray, 
             faults.append((number, OTHER, f"{_shown(own)}, not {named}"))
         elif not LEVELS_DB[0] < level < LEVELS_DB[1]:
             faults.append((number, LEVEL, f"{level:g} dBm is not between {LEVELS_DB[0]:g} and {LEVELS_DB[1]:g}"))
-        elif not (-OUTSIDE_M <= x <= width + OUTSIDE_M and -OUTSIDE_M <= y <= depth + OUTSIDE_M and low <= z <= high):
+        elif not (in_room(x, y, receivers.limits_m) and low <= z <= high):
             room = f"the room of {width:g} x {depth:g} m, or {HEIGHT_M:g} m above or below the receivers"
             faults.append((number, POSITION, f"({x:g}, {y:g}, {z:g}) m is outside {room}"))
         else:
@@ -67,31 +68,21 @@ def _parse(line: bytes) -> tuple[float, bytes, bytes, float, float, float, float
     """
     fields = line.split(b",")
     if len(fields) != FIELDS:
-        raise ValueError(f"{len(fields)} fields instead of {FIELDS}")
+        raise ValueError(f"{len(fields)} fields instead of {FIELDS} with commas between them")
     try:
         time, level, *rest = map(float, (fields[0], *fields[3:]))
+        if b"_" in line:
+            raise ValueError
     except ValueError:
-        wrong = next(field for field in (fields[0], *fields[3:]) if not _is_number(field))
-        raise ValueError(f"{_shown(wrong)} is not a number") from None
+        time, level, *rest = (parse_number(field.decode(errors="replace")) for field in (fields[0], *fields[3:]))
     if not math.isfinite(time + level + sum(rest)):
         raise ValueError("its numbers are not all finite")
-    if b"_" in line and any(b"_" in field for field in (fields[0], *fields[3:])):
-        raise ValueError("an underscore in a number")
     x, y, z = rest[:3]
     return time, fields[1].strip(), fields[2].strip(), level, x, y, z
 
 
-def _is_number(field: bytes) -> bool:
-    try:
-        float(field)
-    except ValueError:
-        return False
-    return True
-
-
 def _shown(field: bytes) -> str:
-    """In a message: on one line, not too long."""
-    return repr(field[:40].decode(errors="replace"))
+    return shown(field.decode(errors="replace"))
 
 
 def _tracked(beacons: list[bytes], receivers: Receivers) -> bytes:

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import codecs
 import json
 import re
-from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from wsn_env.models.recordings.files import DatasetError, parse_json, read_file
+
 DEVICES, PARAMETERS = "tetam.dev", "tetam.par"
-OUTSIDE_M = 1.0  # the target cannot be farther outside the room
+OUTSIDE_M = 1.0  # the target cannot be farther outside the room, see `in_room`
 FARTHEST_M = 10_000.0  # receivers from the origin
 
 SECTION = re.compile(r"\s*(\w+)\s*:(.*)", flags=re.DOTALL)
-
-
-class DatasetError(ValueError):
-    """A file cannot be used; the message names it, the line and what is wrong there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +34,12 @@ class Receivers:
     positions_m: np.ndarray
     limits_m: tuple[float, float]
     beacons: tuple[str, ...] = ()
+
+
+def in_room(x: Any, y: Any, room_m: tuple[float, float]) -> Any:
+    """Whether places (...) lie in a room, or so little outside that whoever measured them may have been there."""
+    wide, deep = room_m
+    return (x >= -OUTSIDE_M) & (x <= wide + OUTSIDE_M) & (y >= -OUTSIDE_M) & (y <= deep + OUTSIDE_M)
 
 
 def read_receivers(folder: str | Path) -> Receivers:
@@ -99,36 +102,28 @@ def _sections(path: Path) -> dict[str, tuple[int, str]]:
 def _table(path: Path, number: int, text: str) -> dict:
     """A JSON table that begins in this line."""
     try:
-        table = json.loads(text, object_pairs_hook=_distinct)
+        table = parse_json(text)
         if not isinstance(table, dict):
             raise ValueError("must be a table {...}")
     except json.JSONDecodeError as problem:
         line = number + problem.lineno - 1
         raise DatasetError(f"{path}, line {line}: {problem.msg} (character {problem.colno} of the table)") from None
-    except (ValueError, RecursionError) as problem:
+    except ValueError as problem:
         raise DatasetError(f"{path}, line {number}: {problem}") from None
     return table
 
 
-def _distinct(pairs: list[tuple[str, object]]) -> dict:
-    table = dict(pairs)
-    if len(table) < len(pairs):
-        twice = next(name for name, times in Counter(name for name, _ in pairs).items() if times > 1)
-        raise ValueError(f"{twice!r} is there twice")
-    return table
-
-
 def _limits(path: Path, positions: np.ndarray) -> tuple[float, float] | None:
-    """Width and depth of the room, if the file gives some that can be right."""
+    """Width and depth of the room, if the file gives some that can be right; it grows to hold its receivers."""
     try:
-        limits = json.loads(path.read_bytes())["limits"]
-    except (OSError, ValueError, TypeError, LookupError, RecursionError):
+        limits = parse_json(read_file(path))["limits"]
+    except (ValueError, TypeError, LookupError):
         return None
     if not _are_numbers(limits, 4) or limits[0] != 0 or limits[1] != 0:
         return None
     far = np.array(limits[2:], float)
     fits = (far > 0).all() and (far <= FARTHEST_M).all() and (positions[:, :2] <= far + OUTSIDE_M).all()
-    return tuple(far.tolist()) if fits else None
+    return tuple(np.maximum(far, positions[:, :2].max(axis=0)).tolist()) if fits else None
 
 
 def _are_numbers(values, count: int) -> bool:
@@ -139,15 +134,3 @@ def _are_numbers(values, count: int) -> bool:
         and all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
         and all(abs(value) < 1e300 for value in values)
     )
-
-
-def read_file(path: Path) -> bytes:
-    """A file's bytes, without the mark of their order.
-
-    Raises:
-        DatasetError: it cannot be read.
-    """
-    try:
-        return path.read_bytes().removeprefix(codecs.BOM_UTF8)
-    except (OSError, ValueError) as problem:
-        raise DatasetError(f"{path}: cannot be read: {getattr(problem, 'strerror', None) or problem}") from None

@@ -38,7 +38,7 @@ def write_recorded_report(
         f"{evaluation.description}. Means over the tracks, with the sd over seeds of that mean; e²/trace: squared"
         " error over what the belief takes it to be. Each track's RMS stands under its name."
     )
-    tables = []
+    tables = [f"<p>{html.escape(note)}</p>" for note in evaluation.notes]
     for lam in evaluation.first.lams:
         header, rows = recorded_rows(evaluation, lam)
         notes = "".join(f"<p>{html.escape(line)}</p>" for line in compare_at_equal_energy(evaluation, lam))
