@@ -1,5 +1,7 @@
 """Tracks: inside the field, at the right speeds, and honest about bad files."""
 
+import os
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -275,6 +277,37 @@ def test_spreadsheets_write_a_byte_order_mark(write):
     [
         ("t,x\n0,1\n1,2\n", "column 'y' is missing"),
         ("", "column 't' is missing"),
+        ("t,x,y,x\n0,1,1,1\n1,2,2,2\n", "column 'x' is there twice: the header must name t, x, y"),
+        ("T,X,Y\n0,1,1\n", "it is 'T,X,Y'"),
+        (
+            "t;x;y\n0;1,5;1\n",
+            "the header must name t, x, y with commas between them; it is 't;x;y'",
+        ),
+        ("t\tx\ty\n0\t1\t1\n", "column 't' is missing"),
+        ("c" * 9999 + "\n", "it is 'ccc"),
+        ("t,x,y\n0,0,10,5\n1,0,20,5\n", "line 2: has 4 fields: must be 3, as in the header"),
+        ("t,x,y\n0,1,1\n1,2,2,2\n", "line 3: has 4 fields"),
+        ("t,x,y,note\n0,1,1,a\n1,2,2\n", "line 3: has 3 fields: must be 4"),
+        ('t,x,y\n"0,5","1","1"\n', "line 2: t: '0,5' is not a number"),
+        ("t,x,y\n0,1_0,1\n1,2,2\n", "line 2: x: '1_0' is not a number"),
+        ("t,x,y\n0,1,1\n1,2,\uff12\n", "line 3: y: '\uff12' is not a number"),
+        (
+            "t,x,y\n2020-02-09T12:00:01,1,1\n",
+            "line 2: t: '2020-02-09T12:00:01' is not a number: a date must be",
+        ),
+        ("t,x,y\n09.02.2020,1,1\n", "a date must be given in seconds"),
+        ("t,x,y\n12:00:01.5,1,1\n", "a date must be given in seconds"),
+        ('t,x,y\n0,"1,1\n' + "1,2,2\n" * 9000, "line 2: cannot be read: "),
+        ('t,x,y\n0,1,1\n1,"2"5,2\n', "line 3: cannot be read: ',' expected after '\"': is there a stray quote?"),
+        ('t,x,y\n0,1,1\n1,2"5,2\n', "line 3: x: '2\"5' is not a number"),
+        ('t,x,y,n\n0,1,1,"a\n1,2,2,b\n2,3,3,c"\n', "line 2: goes on to line 4: is there a stray quote?"),
+        ("t,x,y\n-1e308,1,1\n1e308,2,2\n", "up to 1e+308 are too large to be resampled"),
+        ("t,x,y\n0,-1e308,1\n1,1e308,2\n", "up to 1e+308 are too large to be resampled"),
+        ("t,x,y\n0,1e307,1\n1,1e308,2\n", "up to 1e+308 are too large to be resampled"),
+        (
+            "t,x,y\n" + "".join(f"{1.6e9 + k},{k},1\n" for k in range(9)) + "1600000009000,9,1\n",
+            "line 11: t=1.6e+12 comes after t=1.6e+09, 100.0% of the whole track: must be in the same unit",
+        ),
         ("t,x,y\n0,1,1\n1,nan,2\n", "line 3: t=1.0, x=nan"),
         ("t,x,y\n0,1,1\n1,inf,2\n", "line 3"),
         ("t,x,y\n0,1,1\n1,two,2\n", "line 3"),
@@ -292,22 +325,66 @@ def test_bad_files_are_named_with_the_line(write, text, message):
     with pytest.raises(ScenarioError) as problem:
         recorded(path)
     assert path in str(problem.value) and message in str(problem.value)
+    assert "\n" not in str(problem.value) and len(str(problem.value)) < 200 + len(path)
+
+
+@pytest.mark.parametrize("unit_s", [1, 1e-3, 1e-6, 1e-9, 60, 3600])
+@pytest.mark.parametrize("start_s", [0, 1581249601])
+def test_any_unit_of_time_gives_the_same_track(write, unit_s, start_s):
+    """Only the share of the whole counts."""
+    seconds = np.array([0, 4, 10, 11, 20])
+    points = np.array([[10, 20], [30, 20], [30, 80], [35, 80], [90, 15]])
+
+    def text(times):
+        return "t,x,y\n" + "".join(f"{t!r},{x},{y}\n" for t, (x, y) in zip(times, points.tolist()))
+
+    found = recorded(write(text(((seconds + start_s) / unit_s).tolist())), periods=20)
+    plain = recorded(write(text(seconds.tolist()), "plain.csv"), periods=20)
+    np.testing.assert_allclose(found, plain, rtol=1e-6, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "t,x,y\r\n0,1,1\r\n1,2,2\r\n",
+        "t,x,y\r0,1,1\r1,2,2\r",
+        't,x,y\n"0","1","1"\n"1","2","2"\n',
+        '"t", "x", "y"\n0, 1, 1\n1, 2, 2\n',
+        "t,x,y,\n0,1,1,\n1,2,2,\n",
+        "t,x,y\n0,1,1,\n1,2,2,\n",
+        "\nt,x,y\n\n0,1,1\n\n1,2,2\n\n",
+        'y,note,x,note,t\n1,"a, b",1,,0\n2,,2,,1\n',
+        "t,x,y\n0.0,1e0,+1\n1.0,2E0,2.",
+    ],
+)
+def test_ways_to_write_the_same_track(write, text):
+    plain = recorded(write("t,x,y\n0,1,1\n1,2,2\n", "plain.csv"), span_m=None)
+    np.testing.assert_array_equal(recorded(write(text), span_m=None), plain)
 
 
 def test_missing_and_unreadable_files_are_named(tmp_path):
     picture = tmp_path / "picture.csv"
     picture.write_bytes(b"\xff\xd8\xff\xe0 not text")
-    for path in (tmp_path / "none.csv", tmp_path, picture):
+    wide = tmp_path / "wide.csv"
+    wide.write_text("t,x,y\n0,1,1\n1,2,2\n", encoding="utf-16")
+    os.mkfifo(tmp_path / "pipe.csv")
+    for path in (tmp_path / "none.csv", tmp_path, picture, wide, tmp_path / "pipe.csv", "/dev/zero"):
         with pytest.raises(ScenarioError) as problem:
             recorded(str(path))
         assert str(path) in str(problem.value) and "cannot be read" in str(problem.value)
 
 
 def test_a_recording_outside_the_field_is_refused_unless_scaled(write):
-    path = write("t,x,y\n0,-1,5\n1,7,5\n")
-    with pytest.raises(ScenarioError, match="must lie in the field"):
+    path = write("t,x,y\n0,-1.1,5\n1,7,5\n")
+    with pytest.raises(ScenarioError, match="must lie in the field of 100 x 100 m, or at most 1 m outside, or give"):
         recorded(path, span_m=None)
     assert recorded(path).min() < 100
+
+
+def test_a_recording_may_step_a_little_outside_and_stays_as_it_was(write):
+    path = write("t,x,y\n0,-0.14,5\n1,7,100.9\n")
+    track = recorded(path, span_m=None, periods=1)[0]
+    np.testing.assert_array_equal(track[:, ::2], [[-0.14, 5], [7, 100.9]])
 
 
 def test_recorded_needs_a_file():

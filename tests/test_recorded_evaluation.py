@@ -16,6 +16,8 @@ from wsn_env.bluetooth.synthetic import write_dataset
 from wsn_env.cli import main
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.models.recordings.dataset import read_dataset, track_files
+from wsn_env.models.recordings.files import DatasetWarning
+from wsn_env.models.recordings.receivers import read_receivers
 
 BLE = Scenario.named("Ble-v0", particles=200)
 
@@ -87,6 +89,89 @@ def test_a_recording_must_fit_the_scenario(folder, tmp_path):
     (tmp_path / "broken.mbd").write_text("1,2,3\n")
     with pytest.raises(ScenarioError, match="broken.mbd.* 1"):
         BLE.override(motion="replay", recording=str(tmp_path / "broken.mbd"))
+
+
+def stepping_outside(folder, out, by_m, room=True, count=60):
+    """The folder with its first track some m beyond the wall for a while."""
+    for path in folder.iterdir():
+        if room or path.name != "tetam.par":
+            (out / path.name).write_bytes(path.read_bytes())
+    path = track_files(out)[0]
+    lines = [line.split(",") for line in path.read_text().splitlines()]
+    for fields in lines[100 : 100 + count]:
+        fields[4] = f"{read_receivers(out).limits_m[0] + by_m:.3f}"
+    path.write_text("".join(",".join(fields) + "\n" for fields in lines))
+    return path
+
+
+@pytest.mark.parametrize("room", [True, False])
+@pytest.mark.parametrize("by_m", [0.14, 0.9])
+def test_a_track_that_steps_outside_is_replayed_where_it_was(folder, tmp_path, by_m, room):
+    path = stepping_outside(folder, tmp_path, by_m, room)
+    tracks = read_dataset(tmp_path)
+    assert all(track.note is None for track in tracks)
+    scenario = BLE.override(**calibrate(tracks).quantities, motion="replay", recording=str(path))
+    target = World(scenario).reset(np.arange(1, dtype=np.uint64)).track[0, 1:, ::2]
+    np.testing.assert_array_equal(target, tracks[0].per_period(1.0)[2])
+    assert target[:, 0].max() == pytest.approx(read_receivers(tmp_path).limits_m[0] + by_m, abs=1e-3)
+    evaluation = evaluate_recorded(["all"], BLE, tmp_path, seeds=1)
+    assert len(evaluation.by_track) == 3 and evaluation.notes == ()
+
+
+def test_a_track_that_goes_far_outside_is_told(folder, tmp_path):
+    stepping_outside(folder, tmp_path, 1.1, count=200)
+    with pytest.warns(DatasetWarning, match="left out: 200 impossible position"):
+        assert len(evaluate_recorded(["all"], BLE, tmp_path, seeds=1).notes) == 1
+    path = track_files(folder)[0]
+    with pytest.raises(ScenarioError, match=r"leaves the room of 12 x 12 m \(side_m, depth_m\) by more than 1 m"):
+        near = {"positions": tuple(map(tuple, np.minimum(read_receivers(folder).positions_m[:, :2], 12)))}
+        path = tmp_path / path.name
+        path.write_bytes(track_files(folder)[0].read_bytes())
+        text = (tmp_path / "tetam.dev").read_text()
+        for x, y in read_receivers(folder).positions_m[:, :2].tolist():
+            text = text.replace(f"[{x}, {y},", f"[{min(x, 12.0)}, {min(y, 12.0)},")
+        (tmp_path / "tetam.dev").write_text(text)
+        World(BLE.override(**near, side_m=12.0, depth_m=12.0, motion="replay", recording=str(path)))
+
+
+def test_what_is_left_out_is_said_above_the_tables(folder, tmp_path, capsys):
+    for path in folder.iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    path = track_files(tmp_path)[1]
+    lines = path.read_text().splitlines()
+    whole = [",".join([line.split(".")[0], *line.split(",")[1:]]) for line in lines]
+    path.write_text("\n".join(whole) + "\n")
+    arguments = ["evaluate", "--scenario", "Ble-v0", "--tracks", str(tmp_path), "--episodes", "1", "--policies", "all"]
+    assert main([*arguments, "--set", "particles=50", "--out", str(tmp_path / "out")]) == 0
+    said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("wsn: ")]
+    assert len(said) == 1 and "repeated packet; times are in whole seconds" in said[0]
+    note = said[0].removeprefix("wsn: ")
+    for name in ("tracks.md", "report.html"):
+        text = (tmp_path / "out" / name).read_text()
+        assert 0 <= text.index(note.split("; times")[0]) < text.index("RMS m")
+    assert main(["calibrate", "--tracks", str(tmp_path), "--out", str(tmp_path / "c")]) == 0
+    assert capsys.readouterr().err.count(f"wsn: {note}") == 1
+    text = (tmp_path / "c" / "calibration.md").read_text()
+    assert text.index(note) < text.index("## Quantities")
+
+
+def test_times_in_ms_are_refused_by_every_command(folder, tmp_path, capsys):
+    for path in folder.iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    path = track_files(tmp_path)[2]
+    lines = [line.split(",") for line in path.read_text().splitlines()]
+    path.write_text("".join(",".join([repr(float(time) * 1000), *rest]) + "\n" for time, *rest in lines))
+    (tmp_path / "out").mkdir()
+    for arguments in (
+        ["evaluate", "--scenario", "Ble-v0", "--tracks", str(tmp_path), "--policies", "all"],
+        ["calibrate", "--tracks", str(tmp_path)],
+        ["replay", "all", "--scenario", "Ble-v0", "--recording", str(path)],
+    ):
+        arguments = [*arguments[:1], *(["--policy"] if "replay" in arguments else []), *arguments[1:]]
+        assert main([*arguments, "--out", str(tmp_path / "out" / "x")]) == 2
+        (said,) = filter(None, capsys.readouterr().err.splitlines())
+        assert said.startswith("wsn: ") and f"{path}: times must be in seconds, and look like ms" in said
+        assert not list((tmp_path / "out").rglob("*"))
 
 
 def test_a_recording_that_changes_is_read_again(folder, tmp_path):

@@ -22,6 +22,7 @@ class RecordedMotion(Motion):
     """Base of motions whose tracks are known beforehand."""
 
     abstract: ClassVar[bool] = True
+    bounded: ClassVar[bool] = False  # where the target was it was, even a little outside
 
     @staticmethod
     def draw(m: Any, stream: Any, course: Any, track: np.ndarray) -> None:

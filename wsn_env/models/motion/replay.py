@@ -9,13 +9,14 @@ import numpy as np
 
 from wsn_env.models.motion.recorded import RecordedMotion
 from wsn_env.models.quantity import ScenarioError
+from wsn_env.models.recordings.receivers import OUTSIDE_M, in_room
 from wsn_env.models.recordings.replay import periods_of, receivers_of, recorded
 
 if TYPE_CHECKING:
     from wsn_env.models.measurement.base import Measurement
     from wsn_env.scenario import Scenario
 
-SAME_PLACE_M = 0.05
+SAME_PLACE_M = 0.05  # of a receiver, in two files
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class Replay(RecordedMotion):
         Raises:
             ScenarioError: the recording is shorter than the horizon, leaves the room, or has other receivers.
         """
-        path, room = self.recording, np.array(scenario.field.room_m)
+        path, room = self.recording, scenario.field.room_m
         _, _, positions = recorded(path, scenario.period_s)
         if len(positions) < scenario.periods:
             most = f"at most {len(positions)}, those of {path}"
@@ -63,10 +64,11 @@ class Replay(RecordedMotion):
                 f"Field.positions: must be those of the {len(theirs)} receivers of {path}, in the same order"
                 " (calibrate on its folder)"
             )
-        if (positions < -SAME_PLACE_M).any() or (positions > room + SAME_PLACE_M).any():
-            raise ScenarioError(f"{path}: leaves the room of {room[0]:g} x {room[1]:g} m (side_m, depth_m)")
+        if not in_room(*positions.T, room).all():
+            farthest = f"by more than {OUTSIDE_M:g} m"
+            raise ScenarioError(f"{path}: leaves the room of {room[0]:g} x {room[1]:g} m (side_m, depth_m) {farthest}")
         track = np.empty((scenario.periods + 1, 4))
-        track[1:, ::2] = np.clip(positions[: scenario.periods], 0.0, room)
+        track[1:, ::2] = positions[: scenario.periods]
         track[0] = track[1]
         for axis in (0, 2):
             track[:, axis + 1] = np.gradient(track[:, axis], scenario.period_s) if scenario.periods > 0 else 0.0
