@@ -8,8 +8,8 @@ from math import inf
 import numpy as np
 from scipy.optimize import least_squares
 
-from wsn_env.bluetooth.calibration import CalibrationError
 from wsn_env.bluetooth.packets import Packets, receiver_pairs
+from wsn_env.models.recordings.calibration_file import CalibrationError
 
 LAGS_S = (0.3, 0.7, 1.2, 2, 3, 4.5, 6.5, 9, 13, 20, 40)  # cells of `autocovariance`
 LAGS_M = (0, 0.1, 0.25, 0.5, 0.8, 1.2, 2, 3, 5, 8)
@@ -41,11 +41,11 @@ class Autocovariance:
 def lagged_covariance(packets: Packets, residual: np.ndarray, lags_s: tuple[float, float]) -> float:
     """Mean product of two residuals of a receiver on the same track whose times differ by a lag in (low, high]."""
     total = pairs = 0
-    for i, j in receiver_pairs(packets):
-        if i is j:
-            lag = np.abs(packets.time_s[i, None] - packets.time_s[i])
+    for i, j, same_track in receiver_pairs(packets):
+        if same_track:
+            lag = np.abs(packets.time_s[i, None] - packets.time_s[j])
             near = (lag > lags_s[0]) & (lag <= lags_s[1])
-            total += residual[i] @ near @ residual[i]
+            total += residual[i] @ near @ residual[j]
             pairs += near.sum()
     return total / max(pairs, 1)
 
@@ -58,19 +58,19 @@ def autocovariance(packets: Packets, residual: np.ndarray) -> Autocovariance:
     shape = len(LAGS_S), len(LAGS_M) - 1
     other = shape[0] - 1  # the row of pairs from different tracks
     sums = np.zeros((4, shape[0] * shape[1]))
-    for i, j in receiver_pairs(packets):
+    for i, j, same_track in receiver_pairs(packets):
         apart = packets.position_m[i, None, :2] - packets.position_m[j, :2]
         metres = np.sqrt(apart[..., 0] ** 2 + apart[..., 1] ** 2)
         products = residual[i, None] * residual[j]
         seconds = np.abs(packets.time_s[i, None] - packets.time_s[j])
-        if i is j:
-            once = np.triu_indices(len(i), 1)
+        if same_track:
+            once = i[:, None] < j
             metres, products, seconds = metres[once], products[once], seconds[once]
             row = np.searchsorted(LAGS_S, seconds, side="right") - 1
         else:
             row = np.full(metres.shape, other)
         column = np.searchsorted(LAGS_M, metres, side="right") - 1
-        good = (row >= 0) & (column < shape[1]) & ((row < other) ^ (i is not j))
+        good = (row >= 0) & (column < shape[1]) & ((row < other) ^ (not same_track))
         cell = row[good] * shape[1] + column[good]
         for k, values in enumerate((None, seconds, metres, products)):
             sums[k] += np.bincount(cell, None if values is None else values[good], sums.shape[1])

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 NEAREST_M = 0.1  # closer distances count as this one
 LOCAL_S = 1.5  # packets this far apart count 1/e in a local mean
+FARTHEST_S = 40.0  # apart on a track are packets that still have something to do with each other
+MOST_AT_ONCE = 2000  # packets of a receiver on a track; pairs of more are taken in blocks, a matrix at a time
 
 
 @dataclass(frozen=True)
@@ -64,15 +66,33 @@ def residuals(packets: Packets, calibration: Calibration) -> np.ndarray:
     return packets.level_db - at_1m[packets.receiver] + exponents[packets.receiver] * packets.distance_db
 
 
-def receiver_pairs(packets: Packets) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Packets of a receiver on two tracks, or on one (then both are the same array), every pair of tracks once."""
+def receiver_pairs(packets: Packets) -> Iterator[tuple[np.ndarray, np.ndarray, bool]]:
+    """Packets of a receiver on two tracks or on one, every pair of tracks once, and whether it is one.
+
+    Of a track with more than `MOST_AT_ONCE` packets, pairs with another track are of as many, evenly chosen.
+    """
     tracks = range(packets.track.max() + 1)
     for receiver in range(packets.receiver.max() + 1):
         heard = packets.receiver == receiver
         own = [np.flatnonzero(heard & (packets.track == track)) for track in tracks]
+        some = [one[:: -(-len(one) // MOST_AT_ONCE) or 1] for one in own]
         for second in tracks:
-            for first in tracks[: second + 1]:
-                yield own[first], own[second]
+            for first in tracks[:second]:
+                yield some[first], some[second], False
+            for rows, near in blocks_in_time(own[second], packets.time_s):
+                yield rows, near, True
+
+
+def blocks_in_time(own: np.ndarray, time_s: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Parts of a track's packets, in the order of time, and those at most `FARTHEST_S` before or after any of them."""
+    if len(own) <= MOST_AT_ONCE:
+        yield own, own
+        return
+    time = time_s[own]
+    for start in range(0, len(own), MOST_AT_ONCE):
+        rows = own[start : start + MOST_AT_ONCE]
+        low, high = time_s[rows[0]] - FARTHEST_S, time_s[rows[-1]] + FARTHEST_S
+        yield rows, own[np.searchsorted(time, low) : np.searchsorted(time, high, side="right")]
 
 
 @dataclass(frozen=True)
@@ -110,9 +130,10 @@ def local_deviation(packets: Packets, residual: np.ndarray) -> np.ndarray:
             own = np.flatnonzero((packets.receiver == receiver) & (packets.track == track))
             if len(own) < 2:
                 continue
-            weight = np.exp(-np.abs(packets.time_s[own, None] - packets.time_s[own]) / LOCAL_S)
-            np.fill_diagonal(weight, 0)
-            total = weight.sum(axis=1)
-            mean = np.divide(weight @ residual[own], total, out=np.full(len(own), np.nan), where=total > 0)
-            deviation[own] = residual[own] - mean
+            for rows, near in blocks_in_time(own, packets.time_s):
+                weight = np.exp(-np.abs(packets.time_s[rows, None] - packets.time_s[near]) / LOCAL_S)
+                weight[rows[:, None] == near] = 0
+                total = weight.sum(axis=1)
+                mean = np.divide(weight @ residual[near], total, out=np.full(len(rows), np.nan), where=total > 0)
+                deviation[rows] = residual[rows] - mean
     return deviation
