@@ -8,15 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wsn_env.bluetooth.calibration import Calibration, CalibrationError
-from wsn_env.bluetooth.covariance import Autocovariance, bias_covariance, fit_bias
+from wsn_env import Scenario, World
+from wsn_env.bluetooth import packets as packets_module
+from wsn_env.bluetooth.calibration import Calibration
+from wsn_env.bluetooth.covariance import Autocovariance, autocovariance, bias_covariance, fit_bias, lagged_covariance
 from wsn_env.bluetooth.fitting import calibrate, fit_mixture, fit_path_loss, leave_one_out
 from wsn_env.bluetooth.losses import advertisements, measure_losses
-from wsn_env.bluetooth.packets import concatenate_tracks, held_out_residuals, residuals
+from wsn_env.bluetooth.packets import concatenate_tracks, held_out_residuals, local_deviation, residuals
 from wsn_env.bluetooth.residual_map import CELL_M, residual_map, save_map
 from wsn_env.cli import Calibrate, run_calibrate
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.models.recordings import dataset
+from wsn_env.models.recordings.calibration_file import CalibrationError, read_quantities
 from wsn_env.models.recordings.dataset import Track, read_dataset
 from wsn_env.models.recordings.receivers import Receivers
 from wsn_env.models.recordings.replay import load_map
@@ -253,23 +256,51 @@ def broken(content: dict, *keys, value) -> dict:
         (["quantities", "exponents", 2], 0, r"quantities.exponents\[2\] = 0"),
         (["quantities", "positions", 1], [1, 2, 3], r"quantities.positions\[1\] = \[1, 2, 3\]"),
         (["quantities", "positions", 1, 0], "x", r"quantities.positions\[1\] = 'x'"),
+        (["version"], 99, "version = 99: must be 1"),
+        (["quantities", "lam"], 1e9, "quantities.lam = 1000000000.0: unknown"),
+        (["quantities", "exponents", 0], -1.5, r"quantities.exponents\[0\] = -1.5: must be a finite number above 0"),
+        (["quantities", "at_1m_db", 0], 1e300, r"quantities.at_1m_db\[0\] = 1e\+300: must be"),
+        (["quantities", "heights_m", 0], 1e300, r"quantities.heights_m\[0\] = 1e\+300: must be"),
+        (["quantities", "field_db"], 1e200, r"quantities.field_db = 1e\+200: must be"),
+        (["quantities", "side_m"], 10**400, "quantities.side_m = 10000"),
+        (["quantities", "drift_s"], "7" * 9999, "quantities.drift_s = '777"),
+        (["quantities", "exponents"], ["1"] * 9999, r"quantities.exponents = \['1', "),
+        (["tracks"], [{}] * 9999, r"tracks = \[{}, "),
     ],
 )
 def test_a_bad_file_is_told(made, tmp_path, keys, value, words):
     path = tmp_path / "c.json"
     made.save(path)
     path.write_text(json.dumps(broken(json.loads(path.read_text()), *keys, value=value)))
-    with pytest.raises(CalibrationError, match=f"c.json: {words}"):
+    with pytest.raises(CalibrationError, match=f"c.json: {words}") as problem:
         Calibration.load(path)
+    assert len(str(problem.value)) < 400 + len(str(path)) and "\n" not in str(problem.value)
+    with pytest.raises(ScenarioError, match=f"calibration = '.*c.json': is no file of `wsn calibrate`: {words}"):
+        Scenario.named("Ble-v0", calibration=path)
+
+
+def test_a_scenario_takes_the_quantities_of_a_file(made, tmp_path):
+    path = tmp_path / "c.json"
+    made.save(path)
+    for encoding in ("utf-8", "utf-8-sig"):
+        path.write_text(json.dumps(json.loads(path.read_text("utf-8"))), encoding=encoding)
+        scenario = Scenario.named("Ble-v0", calibration=path)
+        assert scenario.measurement.exponents == tuple(made.quantities["exponents"])
+        assert scenario.field.positions == tuple(map(tuple, made.quantities["positions"]))
 
 
 def test_no_file_and_no_json(tmp_path):
     with pytest.raises(CalibrationError, match="none.json: cannot be read"):
         Calibration.load(tmp_path / "none.json")
-    for number, text in enumerate(("{", "[1]", "null")):
+    for number, text in enumerate(("{", "[1]", "null", "", "[" * 100_000, '{"kind": 1, "kind": 2}', "\0", "9" * 5000)):
         path = tmp_path / f"{number}.json"
         path.write_text(text)
-        with pytest.raises(CalibrationError, match=f"{number}.json: "):
+        for read in (Calibration.load, read_quantities):
+            with pytest.raises(ValueError, match=f"{number}.json") as problem:
+                read(path)
+            assert len(str(problem.value)) < 300 + len(str(path)) and "\n" not in str(problem.value)
+    for path in (tmp_path, "/dev/zero"):
+        with pytest.raises(CalibrationError, match=f"{path}: cannot be read"):
             Calibration.load(path)
 
 
@@ -340,17 +371,49 @@ def test_a_map_explains_a_track_it_never_saw():
 def test_a_map_is_kept_in_a_file(tmp_path):
     field = np.random.default_rng(0).normal(size=(2, 4, 3)).astype(np.float32)
     save_map(field, tmp_path / "m.npz")
-    assert np.array_equal(load_map(tmp_path / "m.npz"), field)
+    room_m = 4 * CELL_M, 3 * CELL_M
+    assert np.array_equal(load_map(tmp_path / "m.npz", 2, room_m), field)
+    assert np.array_equal(load_map(tmp_path / "m.npz", 2, (1.0 + 1e-9, 0.6)), field)  # a calibration rounds
     (tmp_path / "text.npz").write_text("no")
+    (tmp_path / "cut.npz").write_bytes((tmp_path / "m.npz").read_bytes()[:-40])
+    (tmp_path / "bad.npz").write_bytes(
+        (tmp_path / "m.npz").read_bytes().replace(b"residual_db.npy", b"residual_db.npx")
+    )
     np.savez(tmp_path / "pickle.npz", residual_db=np.array([{}], object), cell_m=CELL_M)
     np.savez(tmp_path / "other.npz", field=field)
     np.savez(tmp_path / "flat.npz", residual_db=field[0], cell_m=CELL_M)
     np.savez(tmp_path / "nan.npz", residual_db=field * np.float32(np.nan), cell_m=CELL_M)
+    np.savez(tmp_path / "huge.npz", residual_db=field * np.float32(1e30), cell_m=CELL_M)
     np.savez(tmp_path / "cell.npz", residual_db=field, cell_m=0.5)
+    np.savez(tmp_path / "double.npz", residual_db=field.astype(float), cell_m=CELL_M)
+    np.savez(tmp_path / "receivers.npz", residual_db=np.repeat(field, 2, axis=0), cell_m=CELL_M)
+    np.savez(tmp_path / "turned.npz", residual_db=field.transpose(0, 2, 1), cell_m=CELL_M)
+    np.savez(tmp_path / "smaller.npz", residual_db=field[:, 1:], cell_m=CELL_M)
     np.save(tmp_path / "array.npy", field)
-    for name in ("text.npz", "pickle.npz", "other.npz", "flat.npz", "nan.npz", "cell.npz", "array.npy", "none.npz"):
-        with pytest.raises(ScenarioError, match=name):
-            load_map(tmp_path / name)
+    names = "text cut bad pickle other flat nan huge cell double receivers turned smaller none".split()
+    for name in (*(f"{name}.npz" for name in names), "array.npy", ""):
+        with pytest.raises(ScenarioError, match=str(tmp_path / name)) as problem:
+            load_map(tmp_path / name, 2, room_m)
+        assert "\n" not in str(problem.value)
+    with pytest.raises(ScenarioError, match=r"\(2, 4, 3\): must be float32 of shape \(12, 83, 71\), for 12"):
+        World(Scenario.named("Ble-v0", residual_map=str(tmp_path / "m.npz"), particles=50))
+
+
+def test_many_packets_are_taken_in_blocks(tracks, made, monkeypatch):
+    """Of one track: the same but for rounding. Pairs of tracks are then of a part of the packets."""
+    packets = concatenate_tracks(tracks[:1])
+    residual = residuals(packets, made)
+    whole = autocovariance(packets, residual)
+    short, local = lagged_covariance(packets, residual, (0.3, 2.0)), local_deviation(packets, residual)
+    monkeypatch.setattr(packets_module, "MOST_AT_ONCE", 30)
+    assert np.bincount(packets.receiver).min() > 60
+    blocks = autocovariance(packets, residual)
+    np.testing.assert_array_equal(blocks.pairs, whole.pairs)
+    np.testing.assert_allclose(blocks.covariance, whole.covariance, rtol=1e-9)
+    assert lagged_covariance(packets, residual, (0.3, 2.0)) == pytest.approx(short, rel=1e-9)
+    np.testing.assert_allclose(local_deviation(packets, residual), local, rtol=1e-6, atol=1e-9)
+    both = autocovariance(concatenate_tracks(tracks[:2]), residuals(concatenate_tracks(tracks[:2]), made))
+    assert 0 < both.pairs[-1].sum() <= len(made.quantities["exponents"]) * 30 * 30
 
 
 def test_a_map_needs_the_tracks_of_its_calibration(tracks, made):

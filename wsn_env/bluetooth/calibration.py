@@ -20,40 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from wsn_env.evaluation.files import replacing
-from wsn_env.models.quantity import ScenarioError, check_quantity, suggest
-
-KIND, VERSION = "wsn_env calibration", 1
-
-# What a scenario takes: each quantity's meaning and bounds; lists hold one figure a receiver.
-LISTS: dict[str, tuple[str, dict[str, Any]]] = {
-    "positions": ("x and y of the receivers [m]", {}),
-    "heights_m": ("heights of the receivers [m]", {}),
-    "at_1m_db": ("level at 1 m (P0) [dBm]", {}),
-    "exponents": ("path loss exponents (n)", dict(above=0)),
-}
-SCALARS: dict[str, tuple[str, dict[str, Any]]] = {
-    "side_m": ("width of the room, along x", dict(above=0)),
-    "depth_m": ("depth of the room, along y", dict(above=0)),
-    "beacon_m": ("mean height of the beacon", {}),
-    "field_db": ("sd of the field that stands in the room", dict(at_least=0)),
-    "field_m": ("its correlation length", dict(above=0)),
-    "drift_db": ("sd of the drift", dict(at_least=0)),
-    "drift_s": ("its time constant", dict(above=0)),
-    "main_db": ("mean of the white part's upper component", {}),
-    "main_sd_db": ("its sd", dict(above=0)),
-    "fade_share": ("weight of the lower component", dict(at_least=0, at_most=1)),
-    "fade_db": ("its mean", {}),
-    "fade_sd_db": ("its sd", dict(above=0)),
-    "loss": ("probability that a packet is lost", dict(at_least=0, below=1)),
-    "loss_after_loss": ("the same if the packet before was lost", dict(at_least=0, below=1)),
-    "interval_s": ("advertising interval", dict(above=0)),
-    "bias_s": ("time constant of the tracker's bias", dict(above=0)),
-}
-QUANTITIES = LISTS | SCALARS
-
-
-class CalibrationError(ValueError):
-    """A calibration cannot be made, or a file holds none; the message names the file, the field and its value."""
+from wsn_env.models.recordings.calibration_file import KIND, VERSION, read_calibration
 
 
 @dataclass(frozen=True)
@@ -63,7 +30,7 @@ class Calibration:
     Args:
         tracks: names of the tracks that it is made of.
         left_out: name of the track that was left out, if any.
-        quantities: what a scenario takes, by the names in `QUANTITIES`.
+        quantities: what a scenario takes, by the names in `calibration_file.QUANTITIES`.
         found: further figures, for people.
         versions: what made it.
     """
@@ -96,58 +63,6 @@ class Calibration:
     @classmethod
     def load(cls, path: str | Path) -> Calibration:
         """Read what `save` wrote; whatever is wrong raises CalibrationError."""
-        try:
-            content = json.loads(Path(path).read_text(encoding="utf-8"))
-        except OSError as error:
-            raise CalibrationError(f"{path}: cannot be read: {error.strerror or error}") from error
-        except ValueError as error:
-            raise CalibrationError(f"{path}: is no JSON: {error}") from error
-        try:
-            _check(content)
-        except (CalibrationError, ScenarioError) as error:
-            raise CalibrationError(f"{path}: {error}") from None
+        content = read_calibration(path)
         names = ("left_out", "quantities", "found", "versions")
         return cls(tuple(content["tracks"]), **{name: content[name] for name in names})
-
-
-def _check(content: Any) -> None:
-    """Raise unless a file's content is a calibration."""
-    if not isinstance(content, dict) or content.get("kind") != KIND:
-        kind = content.get("kind") if isinstance(content, dict) else content
-        raise CalibrationError(f"kind = {kind!r}: must be {KIND!r}")
-    if content.get("version") != VERSION:
-        raise CalibrationError(f"version = {content.get('version')!r}: must be {VERSION}")
-    texts = content.get("tracks")
-    if not isinstance(texts, list) or not texts or not all(isinstance(text, str) for text in texts):
-        raise CalibrationError(f"tracks = {texts!r}: must be a list of names")
-    left_out = content.get("left_out", 0)
-    if not (left_out is None or isinstance(left_out, str)) or left_out in texts:
-        raise CalibrationError(f"left_out = {left_out!r}: must be null, or the name of a track that is not in tracks")
-    for name in ("quantities", "found", "versions"):
-        if not isinstance(content.get(name), dict):
-            raise CalibrationError(f"{name} = {content.get(name)!r}: must be an object")
-    _check_quantities(content["quantities"])
-
-
-def _check_quantities(quantities: dict[str, Any]) -> None:
-    for name in quantities:
-        if name not in QUANTITIES:
-            raise CalibrationError(f"quantities.{name} = {quantities[name]!r}: unknown; {suggest(name, QUANTITIES)}")
-    for name in QUANTITIES:
-        if name not in quantities:
-            raise CalibrationError(f"quantities.{name}: is missing ({QUANTITIES[name][0]})")
-    for name, (_, allowed) in SCALARS.items():
-        check_quantity("quantities", name, quantities[name], **allowed)
-    positions = quantities["positions"]
-    count = len(positions) if isinstance(positions, list) else 0
-    for name, (meaning, allowed) in LISTS.items():
-        values = quantities[name]
-        if not isinstance(values, list) or not values or len(values) != count:
-            raise CalibrationError(
-                f"quantities.{name} = {values!r}: must be a list, one for every receiver ({meaning})"
-            )
-        for i, value in enumerate(values):
-            if name == "positions" and not (isinstance(value, list) and len(value) == 2):
-                raise CalibrationError(f"quantities.positions[{i}] = {value!r}: must be a pair, x and y")
-            for number in value if name == "positions" else [value]:
-                check_quantity("quantities", f"{name}[{i}]", number, **allowed)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from wsn_env.bluetooth.calibration import Calibration, CalibrationError
+from wsn_env.bluetooth.calibration import Calibration
 from wsn_env.bluetooth.fitting import calibrate, leave_one_out
 from wsn_env.bluetooth.residual_map import residual_map, save_map
 from wsn_env.models.quantity import suggest
+from wsn_env.models.recordings.calibration_file import CalibrationError
 from wsn_env.models.recordings.dataset import Track
 
 

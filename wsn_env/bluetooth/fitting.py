@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.optimize import minimize
 
-from wsn_env.bluetooth.calibration import QUANTITIES, SCALARS, Calibration, CalibrationError
+from wsn_env.bluetooth.calibration import Calibration
 from wsn_env.bluetooth.covariance import LEAST_BIAS, autocovariance, fit_bias, lagged_covariance
 from wsn_env.bluetooth.losses import measure_losses
 from wsn_env.bluetooth.packets import Packets, concatenate_tracks
+from wsn_env.models.recordings.calibration_file import QUANTITIES, SCALARS, CalibrationError
 
 if TYPE_CHECKING:
     from wsn_env.models.recordings.dataset import Track

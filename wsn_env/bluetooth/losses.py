@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wsn_env.bluetooth.calibration import CalibrationError
+from wsn_env.models.recordings.calibration_file import CalibrationError
 
 if TYPE_CHECKING:
     from wsn_env.models.recordings.dataset import Track

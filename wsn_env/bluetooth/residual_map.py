@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from wsn_env.bluetooth.calibration import Calibration, CalibrationError
+from wsn_env.bluetooth.calibration import Calibration
 from wsn_env.bluetooth.packets import concatenate_tracks, residuals
 from wsn_env.evaluation.files import replacing
-from wsn_env.models.recordings.replay import CELL_M
+from wsn_env.models.recordings.calibration_file import CalibrationError
+from wsn_env.models.recordings.replay import CELL_M, map_cells
 
 if TYPE_CHECKING:
     from wsn_env.models.recordings.dataset import Track
@@ -39,7 +39,7 @@ def residual_map(tracks: Sequence[Track], calibration: Calibration) -> np.ndarra
     chosen = [by_name[name] for name in calibration.tracks]
     packets = concatenate_tracks(chosen)
     residual = residuals(packets, calibration)
-    nx, ny = (ceil(limit / CELL_M) for limit in chosen[0].receivers.limits_m)
+    nx, ny = map_cells(chosen[0].receivers.limits_m)
     cells = np.stack(np.meshgrid(np.arange(nx), np.arange(ny), indexing="ij"), axis=-1).reshape(-1, 2)
     centres = (cells + 0.5) * CELL_M
     fields = []

@@ -23,7 +23,8 @@ class ParticleTracker:
         self.threads = threads
         self._filter_rows = compiling.fast(kernels.filter_rows) if fast else kernels.filter_rows
         self._constants = constants(scenario)
-        self.maps: np.ndarray = scenario.measurement.residual_maps(scenario.field.nodes)
+        field = scenario.field
+        self.maps: np.ndarray = scenario.measurement.residual_maps(field.nodes, field.room_m)
         self._anywhere = scenario.tracking.velocity_s is not None and scenario.tracking.start != "known"
 
     def start(self, keys: np.ndarray, periods: np.ndarray, rows: np.ndarray, belief: Belief) -> None:

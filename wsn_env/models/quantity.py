@@ -47,7 +47,7 @@ def check_quantity(  # noqa: PLR0913
         return
     if choices is not None:
         if value not in choices:
-            raise ScenarioError(f"{owner}.{name} = {value!r}: allowed are {', '.join(map(str, choices))}")
+            raise ScenarioError(f"{owner}.{name} = {value!r:.80}: allowed are {', '.join(map(str, choices))}")
         return
     good = (
         isinstance(value, NUMBERS)
@@ -63,7 +63,7 @@ def check_quantity(  # noqa: PLR0913
         bounds = (("above", above), ("at least", at_least), ("at most", at_most), ("below", below))
         rules = " and ".join(f"{words} {bound}" for words, bound in bounds if bound is not None)
         kind = "a whole number" if whole else "a finite number"
-        raise ScenarioError(f"{owner}.{name} = {value!r}: must be {kind} {rules}".rstrip())
+        raise ScenarioError(f"{owner}.{name} = {value!r:.80}: must be {kind} {rules}".rstrip())
 
 
 @dataclass(frozen=True)

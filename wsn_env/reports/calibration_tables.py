@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from wsn_env.bluetooth.calibration import SCALARS, Calibration
+from wsn_env.bluetooth.calibration import Calibration
 from wsn_env.bluetooth.packets import HeldOut, held_out_residuals
 from wsn_env.evaluation.files import replacing
+from wsn_env.models.recordings.calibration_file import SCALARS
 from wsn_env.models.recordings.dataset import Track
 from wsn_env.reports.calibration_plots import draw_calibration
 from wsn_env.reports.pictures import write_picture
@@ -76,6 +77,7 @@ def _markdown(tracks: Sequence[Track], whole: Calibration, parts: Sequence[Calib
         "",
         f"{found['packets']} packets of {len(tracks)} tracks ({', '.join(whole.tracks)}) at {len(q['exponents'])} "
         f"receivers. For the public tracks of the data set cite: {SOURCE} (CC0).",
+        *(line for track in tracks if track.note for line in ("", track.note)),
         "",
         "    level = P0 - 10 n log10(distance) + field(position) + drift(time) + white",
         "",

@@ -23,7 +23,7 @@ from wsn_env.models.own import kind_and_settings
 from wsn_env.models.quantity import NUMBERS, ScenarioError, Section, quantity, suggest
 from wsn_env.models.radio.base import Link
 from wsn_env.models.radio.radio import Radio
-from wsn_env.models.recordings.replay import read_quantities
+from wsn_env.models.recordings.calibration_file import read_quantities
 from wsn_env.scenario.quantities import Quantities
 from wsn_env.scenario.tracking import BOUNDARY_TRACKERS, Tracking, reads
 

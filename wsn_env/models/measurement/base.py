@@ -151,7 +151,7 @@ class Measurement(Kind):
         """Where an episode's packets come from, drawn or recorded before it begins; None: there are none."""
         return None
 
-    def residual_maps(self, nodes: int) -> np.ndarray:
+    def residual_maps(self, nodes: int, room_m: tuple[float, float]) -> np.ndarray:
         """(S, nx, ny) float32: what a tracker knows that values are off by, cell by cell; (0, 0, 0): nothing."""
         return np.zeros((0, 0, 0), np.float32)
 

@@ -153,21 +153,15 @@ class Beacon(Measurement):
         """Where an episode's packets come from."""
         return Packets(self, scenario)
 
-    def residual_maps(self, nodes: int) -> np.ndarray:
+    def residual_maps(self, nodes: int, room_m: tuple[float, float]) -> np.ndarray:
         """(S, nx, ny) float32 dB: what the tracker's mean levels are off by, cell by cell; (0, 0, 0): no map.
 
         Raises:
-            ScenarioError: a map of other receivers.
+            ScenarioError: no map, or one of other receivers or of another room.
         """
         if self.residual_map is None:
             return np.zeros((0, 0, 0), np.float32)
-        maps = load_map(self.residual_map)
-        if len(maps) != nodes or not maps.size:
-            raise ScenarioError(
-                f"Beacon.residual_map = {self.residual_map!r}: has shape {maps.shape}: must begin with {nodes}"
-                " receivers"
-            )
-        return maps
+        return load_map(self.residual_map, nodes, room_m)
 
     def constants(self, scenario: Scenario) -> dict[str, float]:
         """What the tracker takes levels for."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-import json
+import io
+import math
 import zipfile
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
@@ -14,13 +16,12 @@ import numpy as np
 
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.models.recordings.dataset import Track, read_track
-from wsn_env.models.recordings.receivers import DEVICES, PARAMETERS, DatasetError
+from wsn_env.models.recordings.files import DatasetError, read_file
+from wsn_env.models.recordings.receivers import DEVICES, PARAMETERS
 
 CELL_M = 0.25  # of a residual map
-CALIBRATED = (  # quantities of a calibration, all of them
-    "positions side_m depth_m heights_m beacon_m at_1m_db exponents field_db field_m drift_db drift_s main_db"
-    " main_sd_db fade_share fade_db fade_sd_db loss loss_after_loss interval_s bias_s"
-).split()
+MOST_DB = 100.0  # in it
+NO_MAP = OSError, ValueError, KeyError, EOFError, TypeError, AttributeError, zipfile.BadZipFile, zlib.error  # of NumPy
 
 
 def recorded(path: str | Path, period_s: float) -> Any:
@@ -57,7 +58,8 @@ def _named(path: str | Path) -> Iterator[None]:
 def _stamps(path: str | Path) -> tuple[int, ...]:
     """Of the recording and of what says where its receivers stand: a file that has changed is read again."""
     beside = (Path(path).with_name(name) for name in (DEVICES, PARAMETERS))
-    return Path(path).stat().st_mtime_ns, *(file.stat().st_mtime_ns for file in beside if file.exists())
+    states = [Path(path).stat(), *(file.stat() for file in beside if file.exists())]
+    return tuple(number for state in states for number in (state.st_mtime_ns, state.st_size))
 
 
 @lru_cache(maxsize=32)
@@ -65,41 +67,41 @@ def _read(path: str, *stamps: int) -> Track:
     return read_track(path)
 
 
-def read_quantities(path: str | Path) -> dict[str, Any]:
-    """The scenario quantities of a file that `wsn calibrate` wrote.
-
-    Raises:
-        ScenarioError: names the file and what is wrong with it.
-    """
-    try:
-        plain = json.loads(Path(path).read_text(encoding="utf-8"))
-        quantities = plain["quantities"]
-        if not isinstance(quantities, dict):
-            raise TypeError("its 'quantities' must be a table")
-        missing = [name for name in CALIBRATED if name not in quantities]
-        if missing:
-            raise KeyError(f"its 'quantities' lack {', '.join(missing)}")
-    except (OSError, ValueError, KeyError, TypeError) as problem:
-        raise ScenarioError(f"calibration = {str(path)!r}: is no file of `wsn calibrate`: {problem!r}") from None
-    if isinstance(quantities.get("positions"), list):
-        quantities["positions"] = tuple(map(tuple, quantities["positions"]))
-    return quantities
+def map_cells(room_m: tuple[float, float]) -> tuple[int, int]:
+    """(nx, ny) cells of a residual map; a calibration rounds the room's extents."""
+    nx, ny = (math.ceil(round(extent, 6) / CELL_M) for extent in room_m)
+    return nx, ny
 
 
-def load_map(path: str | Path) -> np.ndarray:
+def load_map(path: str | Path, receivers: int, room_m: tuple[float, float]) -> np.ndarray:
     """A residual map of `wsn calibrate --maps`: (S, nx, ny) float32 dB. Executes nothing.
 
     Raises:
         ScenarioError: names the file and what is wrong with it.
     """
     try:
-        with np.load(path, allow_pickle=False) as content:
+        with np.load(io.BytesIO(read_file(path)), allow_pickle=False) as content:
             field, cell = content["residual_db"], content["cell_m"]
-    except (OSError, ValueError, KeyError, EOFError, TypeError, AttributeError, zipfile.BadZipFile) as error:
+    except DatasetError as error:
+        raise ScenarioError(f"residual_map = {str(path)!r}: {error}") from None
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        EOFError,
+        TypeError,
+        AttributeError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
         raise ScenarioError(f"{path}: is no residual map: {error}") from None
     if cell.shape or cell != CELL_M:
-        raise ScenarioError(f"{path}: cell_m = {cell!r}: must be {CELL_M}")
-    if field.ndim != 3 or field.dtype != np.float32 or not np.isfinite(field).all():
+        raise ScenarioError(f"{path}: cell_m = {cell!r:.60}: must be {CELL_M}")
+    shape = (receivers, *map_cells(room_m))
+    if field.shape != shape or field.dtype != np.float32 or not (np.abs(field) <= MOST_DB).all():
         kind = f"{field.dtype} of shape {field.shape}"
-        raise ScenarioError(f"{path}: residual_db = {kind}: must be finite float32 of shape (S, nx, ny)")
+        raise ScenarioError(
+            f"{path}: residual_db = {kind}: must be float32 of shape {shape}, for {receivers} receivers in a room of"
+            f" {room_m[0]:g} x {room_m[1]:g} m, between -{MOST_DB:g} and {MOST_DB:g} dB"
+        )
     return field
