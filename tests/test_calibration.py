@@ -324,6 +324,10 @@ def test_tracks_that_cannot_be_calibrated(tracks):
     ):
         with pytest.raises(CalibrationError, match=words):
             calibrate(bad)
+    distance = np.linalg.norm(first.position_m - ROOM.positions_m[first.receiver], axis=1)
+    farther_louder = replace(first, level_db=-90 + 2 * distance)
+    with pytest.raises(CalibrationError, match=r"tracks = \['walk0'\]: show no radio .* quantities.exponents\[0\] = -"):
+        calibrate([farther_louder])
     with pytest.raises(CalibrationError, match="at least two"):
         leave_one_out([first])
 

@@ -20,7 +20,8 @@ from wsn_env.bluetooth.calibration import Calibration
 from wsn_env.bluetooth.covariance import LEAST_BIAS, autocovariance, fit_bias, lagged_covariance
 from wsn_env.bluetooth.losses import measure_losses
 from wsn_env.bluetooth.packets import Packets, concatenate_tracks
-from wsn_env.models.recordings.calibration_file import QUANTITIES, SCALARS, CalibrationError
+from wsn_env.models.quantity import ScenarioError
+from wsn_env.models.recordings.calibration_file import QUANTITIES, SCALARS, CalibrationError, check_quantities
 
 if TYPE_CHECKING:
     from wsn_env.models.recordings.dataset import Track
@@ -101,6 +102,10 @@ def calibrate(tracks: Sequence[Track]) -> Calibration:
     made_by = {"python": platform.python_version()} | {name: version(name) for name in ("wsn_env", "numpy", "scipy")}
     names = tuple(track.name for track in tracks)
     ordered = {name: _json_value(quantities[name]) for name in QUANTITIES}
+    try:
+        check_quantities(ordered)
+    except (CalibrationError, ScenarioError) as problem:
+        raise CalibrationError(f"tracks = {list(names)!r:.80}: show no radio that can be: {problem}") from None
     return Calibration(names, None, ordered, {name: _json_value(value) for name, value in found.items()}, made_by)
 
 

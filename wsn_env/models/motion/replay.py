@@ -64,7 +64,7 @@ class Replay(RecordedMotion):
                 f"Field.positions: must be those of the {len(theirs)} receivers of {path}, in the same order"
                 " (calibrate on its folder)"
             )
-        if not in_room(*positions.T, room).all():
+        if not in_room(positions[:, 0], positions[:, 1], room).all():
             farthest = f"by more than {OUTSIDE_M:g} m"
             raise ScenarioError(f"{path}: leaves the room of {room[0]:g} x {room[1]:g} m (side_m, depth_m) {farthest}")
         track = np.empty((scenario.periods + 1, 4))

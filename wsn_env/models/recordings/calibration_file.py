@@ -98,14 +98,15 @@ def _check(content: Any) -> None:
     for name in ("quantities", "found", "versions"):
         if not isinstance(content.get(name), dict):
             raise CalibrationError(f"{name} = {content.get(name)!r:.60}: must be an object")
-    _check_quantities(content["quantities"])
+    check_quantities(content["quantities"])
 
 
-def _check_quantities(quantities: dict[str, Any]) -> None:
+def check_quantities(quantities: dict[str, Any]) -> None:
+    """Raise CalibrationError or ScenarioError unless they are all there, no others, and within their bounds."""
     for name in quantities:
         if name not in QUANTITIES:
             raise CalibrationError(
-                f"quantities.{name} = {quantities[name]!r:.60}: unknown; {suggest(name, QUANTITIES)}"
+                f"quantities.{name:.60} = {quantities[name]!r:.60}: unknown; {suggest(name, QUANTITIES)}"
             )
     for name in QUANTITIES:
         if name not in quantities:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import io
 import math
-import zipfile
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
@@ -21,7 +19,6 @@ from wsn_env.models.recordings.receivers import DEVICES, PARAMETERS
 
 CELL_M = 0.25  # of a residual map
 MOST_DB = 100.0  # in it
-NO_MAP = OSError, ValueError, KeyError, EOFError, TypeError, AttributeError, zipfile.BadZipFile, zlib.error  # of NumPy
 
 
 def recorded(path: str | Path, period_s: float) -> Any:
@@ -84,17 +81,9 @@ def load_map(path: str | Path, receivers: int, room_m: tuple[float, float]) -> n
             field, cell = content["residual_db"], content["cell_m"]
     except DatasetError as error:
         raise ScenarioError(f"residual_map = {str(path)!r}: {error}") from None
-    except (
-        OSError,
-        ValueError,
-        KeyError,
-        EOFError,
-        TypeError,
-        AttributeError,
-        zipfile.BadZipFile,
-        zlib.error,
-    ) as error:
-        raise ScenarioError(f"{path}: is no residual map: {error}") from None
+    except Exception as error:  # zip, its decompressors and NumPy raise what they like of a damaged file
+        why = f"{type(error).__name__}: {' '.join(str(error).split()):.200}"
+        raise ScenarioError(f"{path}: is no residual map: {why}") from None
     if cell.shape or cell != CELL_M:
         raise ScenarioError(f"{path}: cell_m = {cell!r:.60}: must be {CELL_M}")
     shape = (receivers, *map_cells(room_m))

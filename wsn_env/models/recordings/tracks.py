@@ -109,7 +109,7 @@ def _resampled(path: str, times: np.ndarray, points: np.ndarray, span_m: float |
         if extent == 0:
             raise ScenarioError(f"{path}: the target does not move: cannot scale to span_m = {span_m}")
         points = room / 2 + (points - (low + high) / 2) * min(span_m, room.min()) / extent
-    elif not in_room(*points.T, scenario.field.room_m).all():
+    elif not in_room(points[:, 0], points[:, 1], scenario.field.room_m).all():
         raise ScenarioError(
             f"{path}: spans {points.min()}..{points.max()} m: must lie in the field of {room[0]:g} x {room[1]:g} m, or"
             f" at most {OUTSIDE_M:g} m outside, or give span_m"
