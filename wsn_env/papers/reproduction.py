@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from pathlib import Path
 
+from wsn_env.evaluation.files import alone_in
 from wsn_env.evaluation.progress import Progress
 from wsn_env.models.quantity import suggest
 
@@ -21,7 +22,7 @@ def reproduce(name: str, out: str | Path, runs: int = 100, progress: Progress | 
         progress: called as progress(done, total, what) after every simulated period; None: a bar on the terminal.
 
     Raises:
-        ValueError: for an unknown paper or too few runs.
+        ValueError: for an unknown paper, too few runs, or a folder that another run writes into.
     """
     if name not in (*PAPERS, "all"):
         raise ValueError(f"paper {name!r} is unknown: {suggest(str(name), (*PAPERS, 'all'))}")
@@ -30,4 +31,5 @@ def reproduce(name: str, out: str | Path, runs: int = 100, progress: Progress | 
     for paper, module in PAPERS.items():
         if name in (paper, "all"):
             folder = Path(out) / paper if name == "all" else Path(out)
-            import_module(module).reproduce(folder, runs, progress)
+            with alone_in(folder):
+                import_module(module).reproduce(folder, runs, progress)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from wsn_env.evaluation.files import replacing
+from wsn_env.evaluation.files import check_replaceable, replacing
 from wsn_env.evaluation.policies import Policy
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.reports.pages.page import build_page, fill_template, json_for_script, read_template
@@ -32,6 +32,7 @@ def replay(policies: dict[str, Policy], scenario: Scenario, seed: int, out: str 
         raise ScenarioError(f"Scenario.lam = {scenario.lam!r}: must be one number for a replay")
     if seed < 0:
         raise ValueError(f"seed = {seed}: must be at least 0")
+    check_replaceable(out)
     recording = record(policies, scenario, seed)
     page = build_page("replay", f"{scenario.name}, seed {seed}", player_html(recording))
     Path(out).parent.mkdir(parents=True, exist_ok=True)
