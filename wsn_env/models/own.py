@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from wsn_env.models.kinds import Kind, Registry
+from wsn_env.models.own_files import OF_FILES, watch
 from wsn_env.models.quantity import ScenarioError, parse_overrides, suggest
-
-OF_FILES = "wsn_env_own_"  # so begin the names of modules that are files given by path
 
 
 def class_in(path: Path, name: str) -> Any:
-    """A class of a Python file, which is read once.
+    """A class of a Python file, which is read once, and again when it has changed.
 
     Raises:
         ValueError: there is no such file or class.
@@ -23,13 +22,14 @@ def class_in(path: Path, name: str) -> Any:
     if not path.is_file():
         raise ValueError(f"{f'{path}:{name}'!r}: there is no file {path}")
     file = str(path.resolve())
-    module_name = f"{OF_FILES}{path.stem}_{sha256(file.encode()).hexdigest()[:8]}"
+    module_name = f"{OF_FILES}{path.stem}_{sha256(file.encode() + path.read_bytes()).hexdigest()[:8]}"
     module = sys.modules.get(module_name)
     if module is None:
         spec = spec_from_file_location(module_name, file)
         if spec is None or spec.loader is None:
             raise ValueError(f"{f'{path}:{name}'!r}: {path} is no Python file")
         module = sys.modules[module_name] = module_from_spec(spec)
+        watch(module_name)
         try:
             spec.loader.exec_module(module)
         except BaseException:
