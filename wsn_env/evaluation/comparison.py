@@ -11,6 +11,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Iterable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -18,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from wsn_env.evaluation.files import replacing
+from wsn_env.evaluation.files import alone_in, replacing
 from wsn_env.evaluation.intervals import Summary
 from wsn_env.evaluation.kept_blocks import KeptBlocks
 from wsn_env.evaluation.policies import Policy, named_policies
@@ -171,13 +172,14 @@ def evaluate(  # noqa: PLR0913
         lams: the trade-offs [m/mJ]; None: the scenario's, which must then be a single one.
         episodes: common random episodes for each policy and lam.
         seed: another seed, other episodes; training never meets any of them.
-        keep: a folder for finished blocks, so that a stopped run continues; None: none are kept.
+        keep: a folder for finished blocks, so that a stopped run continues; None: none are kept. Of an object without
+            a repr its state decides whether they are its own; what it reads, too, but for files read before.
         progress: called with (blocks done, of, what).
         threads: as World's.
         engine: where the blocks are played; None: in this process. The rows do not depend on it.
 
     Raises:
-        ValueError: for an unknown policy, or seed and episodes out of range.
+        ValueError: for an unknown policy, seed and episodes out of range, or another run that keeps blocks there.
     """
     if lams is None:
         if isinstance(scenario.lam, (tuple, list)):
@@ -188,7 +190,6 @@ def evaluate(  # noqa: PLR0913
         raise ValueError("policies and lams must name at least one each")
     named = policies if isinstance(policies, dict) else named_policies(policies, scenario)
     seeds = evaluation_seeds(seed, episodes)
-    kept = KeptBlocks(keep, _settings(scenario, named, lams, episodes, seed), list(named.values()))
     blocks: dict[tuple[str, float | None, int], Block] = {}
     for lam in lams:
         at_this = scenario.override(lam=lam)
@@ -197,11 +198,14 @@ def evaluate(  # noqa: PLR0913
             for number in range(-(-episodes // BLOCK)):
                 own = seeds[number * BLOCK : (number + 1) * BLOCK]
                 blocks.setdefault((name, used_lam, number), Block(name, used_lam, number, policy, at_this, own))
-    missing = [block for block in blocks.values() if not kept.has(block)]
-    for done, (block, measured) in enumerate((engine or in_this_process(threads))(missing), len(blocks) - len(missing)):
-        kept.put(block, measured)
-        if progress:
-            progress(done + 1, len(blocks), block.name if block.lam is None else f"{block.name}, lam {block.lam:g}")
+    with nullcontext() if keep is None else alone_in(keep):
+        kept = KeptBlocks(keep, scenario, _settings(scenario, named, lams, episodes, seed), list(named.values()))
+        missing = [block for block in blocks.values() if not kept.has(block)]
+        played = (engine or in_this_process(threads))(missing)
+        for done, (block, measured) in enumerate(played, len(blocks) - len(missing)):
+            kept.put(block, measured)
+            if progress:
+                progress(done + 1, len(blocks), block.name if block.lam is None else f"{block.name}, lam {block.lam:g}")
     rows: list[Row] = []
     for lam in lams:
         for name, policy in named.items():

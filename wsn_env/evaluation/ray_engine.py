@@ -7,10 +7,10 @@ import socket
 import sys
 from collections.abc import Iterator, Sequence
 from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from wsn_env.evaluation.rollout import Block, Engine, in_this_process
-from wsn_env.models.own import OF_FILES
+from wsn_env.models.own_files import OF_FILES, add_noted, noted_files, watch
 
 if TYPE_CHECKING:
     from ray import ObjectRef
@@ -76,7 +76,7 @@ def _play_blocks(ray: ModuleType, blocks: Sequence[Block]) -> Iterator[tuple[Blo
             ray.cloudpickle.register_pickle_by_value(sys.modules[module])
     task = ray.remote(num_cpus=1, max_retries=-1, scheduling_strategy="SPREAD")(_measure_block)
     waiting = list(reversed(blocks))
-    running: dict[ObjectRef[list[dict[str, float]]], Block] = {}
+    running: dict[ObjectRef[Any], Block] = {}
     while waiting or running:
         most = AHEAD * max(1, int(ray.cluster_resources().get("CPU", 1)))
         while waiting and len(running) < most:
@@ -84,11 +84,16 @@ def _play_blocks(ray: ModuleType, blocks: Sequence[Block]) -> Iterator[tuple[Blo
             running[task.remote(block)] = block
         for done in ray.wait(list(running))[0]:
             try:
-                measured = ray.get(done)
+                measured, files = ray.get(done)
             except ray.exceptions.RayTaskError as problem:  # the policy's or the world's own error
                 raise problem.cause from None
-            yield running.pop(done), measured
+            block = running.pop(done)
+            add_noted(type(block.policy).__module__, files)
+            yield block, measured
 
 
-def _measure_block(block: Block) -> list[dict[str, float]]:
-    return next(in_this_process(threads=1)([block]))[1]
+def _measure_block(block: Block) -> tuple[list[dict[str, float]], dict[str, str]]:
+    """What `rollout` measured, and the digests of what own code has read for it."""
+    module = type(block.policy).__module__
+    watch(module)
+    return next(in_this_process(threads=1)([block]))[1], noted_files([module])

@@ -9,6 +9,8 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from pathlib import Path
 
+SOURCES = (".py", ".json", ".safetensors")
+
 
 def versions() -> dict[str, str]:
     """By package."""
@@ -23,7 +25,7 @@ def versions() -> dict[str, str]:
 
 @cache
 def sources_digest() -> str:
-    """Of every source file of the package: what it says may have changed with any of them."""
+    """Of every source file of the package, tuned number and trained policy: what it says may have changed with any."""
     folders = [Path(str(files(name))) for name in ("wsn_env", "wsn_env.agents")]
-    paths = sorted({path.resolve() for folder in folders for path in folder.rglob("*.py")})
+    paths = sorted({path.resolve() for folder in folders for path in folder.rglob("*") if path.suffix in SOURCES})
     return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).hexdigest()
