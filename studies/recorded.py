@@ -87,7 +87,7 @@ def main() -> int:
             progress=report,
         )
     names = save_recorded(evaluation, asked.out)
-    remove_recorded_blocks(evaluation, asked.out)
+    remove_recorded_blocks(asked.out)
     print_recorded_tables(evaluation)
     draw_replay(evaluation, asked, asked.out / "replay.png")
     print(f"written: {', '.join(str(asked.out / name) for name in (*names, 'replay.png'))}")

@@ -165,6 +165,15 @@ def test_a_training_is_read_in_the_order_of_its_steps(tmp_path):
     }.items():
         (tmp_path / f"progress-{begins}").mkdir()
         (tmp_path / f"progress-{begins}" / "progress.csv").write_text(text)
+    for foreign in ("progress-old", "progress-", "progress-1e3", "progress--5", "progress-200 copy", "progress"):
+        (tmp_path / foreign).mkdir()
+        (tmp_path / foreign / "progress.csv").write_text("time/total_timesteps\n50\n")
+    (tmp_path / "progress-7").write_text("a file")
+    (tmp_path / "progress-8" / "progress.csv").mkdir(parents=True)
+    with open(tmp_path / "progress-0" / "progress.csv", "r+") as file:
+        lines = file.read()
+        file.seek(0)
+        file.write(lines.replace("\n,200", "\n,150,1,2\nx,160\n,200"))
     progress = read_progress(tmp_path)
     assert np.array_equal(progress["time/total_timesteps"], [100, 200, 300, 1000, 1100])
     assert np.array_equal(progress["a"], [1.5, *[np.nan] * 4], equal_nan=True)

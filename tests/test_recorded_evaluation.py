@@ -226,6 +226,23 @@ def test_the_command_compares_on_every_track(folder, tmp_path, capsys):
     assert "recorded tracks" in capsys.readouterr().out
 
 
+def test_foreign_files_and_tracks_of_before_do_not_matter(folder, tmp_path):
+    """Files of one's own stay; blocks of a stopped run whose track is gone do not."""
+    for name in ("gone", "walk_0"):
+        (tmp_path / "tracks" / name).mkdir(parents=True)
+        (tmp_path / "tracks" / name / "evaluation.blocks.jsonl").write_text("x\n")
+    mine = {"tracks/walk_0/notes.txt", "tracks/notes.txt", "tracks/own/evaluation.csv", "notes.txt"}
+    for name in mine:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("mine")
+    command = ["evaluate", "--scenario", "Ble-v0", "--tracks", str(folder), "--episodes", "1", "--policies", "all"]
+    for _ in range(2):
+        assert main([*command, "--out", str(tmp_path), "--set", "particles=50"]) == 0
+    left = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()}
+    assert left == mine | {"report.html", "tracks.csv", "tracks.json", "tracks.md", "tracks.png"}
+    assert not (tmp_path / "tracks" / "gone").exists()
+
+
 def test_a_row_can_be_replayed_in_the_environment(folder):
     evaluation = evaluate_recorded(["informed2"], BLE, folder, seeds=2)
     name, each = next(iter(evaluation.by_track.items()))

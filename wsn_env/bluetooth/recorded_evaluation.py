@@ -184,10 +184,15 @@ def _progress_of_track(progress: Progress, number: int, of: int, name: str) -> P
     return lambda done, total, what: progress(number * total + done, of * total, f"{name}: {what}")
 
 
-def remove_recorded_blocks(evaluation: RecordedEvaluation, out: str | Path) -> None:
-    """Remove the kept blocks of a finished run."""
-    out = Path(out)
-    for name in evaluation.by_track:
-        remove_kept_blocks(out / "tracks" / name)
-        (out / "tracks" / name).rmdir()
-    (out / "tracks").rmdir()
+def remove_recorded_blocks(out: str | Path) -> None:
+    """Remove the kept blocks of a finished run, with those of tracks that are there no more; other files stay."""
+    tracks = Path(out) / "tracks"
+    for folder in [path for path in tracks.iterdir() if path.is_dir() and not path.is_symlink()]:
+        remove_kept_blocks(folder)
+        _remove_if_empty(folder)
+    _remove_if_empty(tracks)
+
+
+def _remove_if_empty(folder: Path) -> None:
+    if not any(folder.iterdir()):
+        folder.rmdir()

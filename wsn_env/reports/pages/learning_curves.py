@@ -6,7 +6,7 @@ import csv
 from collections.abc import Sequence
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -39,17 +39,27 @@ def learning_sections(folder: Path) -> list[str]:
 def read_progress(folder: str | Path) -> dict[str, np.ndarray]:
     """Columns of all progress-STEPS/progress.csv of a run, in the order of the steps; what is missing is NaN.
 
-    Of a run that was killed, a line that was cut short is left out, and so is what a resumed one has trained again.
+    Folders of other names are none of it. Of a run that was killed, a line that was cut short is left out, and so is
+    what a resumed one has trained again.
     """
-    begins = {int(path.parent.name.partition("-")[2]): path for path in Path(folder).glob("progress-*/progress.csv")}
+    files = {path.parent.name.partition("-")[2]: path for path in Path(folder).glob("progress-*/progress.csv")}
+    begins = {int(steps): path for steps, path in files.items() if steps.isdecimal() and path.is_file()}
     starts = sorted(begins)
     rows: list[dict[str, float]] = []
     for start, resumed in zip(starts, [*starts[1:], np.inf]):
-        whole, _, _cut_short = begins[start].read_text().rpartition("\n")
-        read = [{k: float(value or "nan") for k, value in row.items()} for row in csv.DictReader(whole.splitlines())]
+        whole, _, _cut_short = begins[start].read_text(encoding="utf-8", errors="replace").rpartition("\n")
+        read = map(_numbers, csv.DictReader(whole.splitlines()))
         rows += [row for row in read if row.get(STEPS, np.nan) <= resumed]
     names = dict.fromkeys(chain.from_iterable(rows))
     return {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
+
+
+def _numbers(row: dict[str, Any]) -> dict[str, float]:
+    """A line's numbers; none of a line that holds something else."""
+    try:
+        return {name: float(value or "nan") for name, value in row.items()}
+    except (TypeError, ValueError):
+        return {}
 
 
 def _draw_curves(steps: np.ndarray, progress: dict[str, np.ndarray], names: Sequence[str]) -> Figure:
