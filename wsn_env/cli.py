@@ -7,17 +7,23 @@ import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tyro
 
+from wsn_env.evaluation.files import alone_in
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.models.quantity import parse_overrides
 from wsn_env.models.recordings.files import DatasetWarning
 from wsn_env.scenario import Scenario
+
+FILES = (  # that commands write into their folders
+    "report.html evaluation.blocks.jsonl evaluation.csv evaluation.json evaluation.md front.csv front.json front.png"
+    " tracks.csv tracks.json tracks.md tracks.png calibration.json calibration.md calibration.png"
+).split()
 
 
 @dataclass
@@ -115,8 +121,9 @@ def main(arguments: list[str] | None = None) -> int:
     }
     commands: dict[str, Callable[..., Any]] = {kind.__name__.lower(): kind for kind in runs}
     command = tyro.extras.subcommand_cli_from_dict(commands, prog="wsn", args=arguments)
+    folder = command.out if isinstance(command, (Evaluate, Calibrate)) else None
     try:
-        with warnings_on_one_line():
+        with warnings_on_one_line(), nullcontext() if folder is None else alone_in(folder, FILES):
             runs[type(command)](command)
     except (ValueError, OSError, MemoryError) as problem:
         print(f"wsn: {user_code_location(problem)}{problem}", file=sys.stderr)
@@ -166,7 +173,7 @@ def run_evaluate(command: Evaluate) -> None:
     from wsn_env.evaluation.kept_blocks import remove_kept_blocks
     from wsn_env.evaluation.policies import named_policies
     from wsn_env.evaluation.ray_engine import on_ray
-    from wsn_env.reports.front_tables import FRONT_FILES, print_and_save_fronts
+    from wsn_env.reports.front_tables import FRONT_FILES, save_and_print_fronts
     from wsn_env.reports.pages.evaluation_page import write_report
     from wsn_env.reports.pictures import can_draw
     from wsn_env.reports.tables import print_tables, save_markdown
@@ -193,10 +200,7 @@ def run_evaluate(command: Evaluate) -> None:
             progress=progress,
             engine=on_ray(command.address) if command.engine == "ray" else None,
         )
-    if command.pareto:
-        print_and_save_fronts(evaluation, command.out)
-    else:
-        print_tables(evaluation)
+    names: list[str] = []
     if command.out:
         evaluation.save(command.out)
         save_markdown(evaluation, command.out)
@@ -204,6 +208,11 @@ def run_evaluate(command: Evaluate) -> None:
         if can_draw():
             with progress_bar() as progress:
                 names.append(write_report(command.out, evaluation, policies, progress=progress).name)
+    if command.pareto:
+        save_and_print_fronts(evaluation, command.out)
+    else:
+        print_tables(evaluation)
+    if command.out:
         remove_kept_blocks(command.out)
         print(f"written: {', '.join(str(command.out / name) for name in names)}")
 
@@ -231,13 +240,15 @@ def run_evaluate_recorded(command: Evaluate) -> None:
             engine=on_ray(command.address) if command.engine == "ray" else None,
             calibrated=any(pair.startswith("calibration=") for pair in command.set),
         )
-    print_recorded_tables(evaluation)
+    names: list[str] = []
     if command.out:
         names = save_recorded(evaluation, command.out)
         if can_draw():
             with progress_bar() as progress:
                 names.append(write_recorded_report(command.out, evaluation, command.policies, progress).name)
-        remove_recorded_blocks(evaluation, command.out)
+        remove_recorded_blocks(command.out)
+    print_recorded_tables(evaluation)
+    if command.out:
         print(f"written: {', '.join(str(command.out / name) for name in names)}")
 
 

@@ -21,16 +21,16 @@ from wsn_env.reports.tables import format_interval, wide_console
 FRONT_FILES = ("front.csv", "front.json", "front.png")
 
 
-def print_and_save_fronts(evaluation: Evaluation, out: Path | None = None) -> None:
-    """Print the fronts and their hypervolumes; write front.csv, front.json and front.png into a folder, if any."""
+def save_and_print_fronts(evaluation: Evaluation, out: Path | None = None) -> None:
+    """Write front.csv, front.json and front.png into a folder, if any; print the fronts and their hypervolumes."""
     found = find_fronts(evaluation)
     reference = reference_point(evaluation.scenario)
     volumes = hypervolumes(found, reference)
-    print_front(evaluation, found)
-    print_hypervolumes(volumes, reference)
     if out is not None:
         save_front(evaluation, found, volumes, out)
         write_picture(out / "front.png", draw_fronts(evaluation, found))
+    print_front(evaluation, found)
+    print_hypervolumes(volumes, reference)
 
 
 def print_front(evaluation: Evaluation, found: Fronts) -> None:
@@ -38,7 +38,7 @@ def print_front(evaluation: Evaluation, found: Fronts) -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    table = Table(title=front_title(evaluation), caption="means with 95 % bootstrap intervals")
+    table = Table(title=escape(front_title(evaluation)), caption="means with 95 % bootstrap intervals")
     for column in ("policy", "lam m/mJ", "mean error m", "energy mJ/period"):
         table.add_column(column, justify="left" if column == "policy" else "right")
     fine, small = map(_digits, reference_point(evaluation.scenario))

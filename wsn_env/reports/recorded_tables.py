@@ -58,17 +58,18 @@ def compare_at_equal_energy(evaluation: RecordedEvaluation, lam: float) -> list[
 
 def print_recorded_tables(evaluation: RecordedEvaluation) -> None:
     """A table for each lam."""
+    from rich.markup import escape
     from rich.table import Table
 
     console = wide_console()
     for lam in evaluation.first.lams:
         header, rows = recorded_rows(evaluation, lam)
         title = f"{evaluation.first.scenario.name}, {evaluation.description}, lam = {lam:g} m/mJ"
-        drawn = Table(title=title, caption="\n".join(compare_at_equal_energy(evaluation, lam)))
+        drawn = Table(title=escape(title), caption=escape("\n".join(compare_at_equal_energy(evaluation, lam))))
         for name in header:
-            drawn.add_column(name, justify="left" if name == "policy" else "right")
+            drawn.add_column(escape(name), justify="left" if name == "policy" else "right")
         for row in rows:
-            drawn.add_row(*row)
+            drawn.add_row(*map(escape, row))
         console.print(drawn)
 
 

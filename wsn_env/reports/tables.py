@@ -81,6 +81,7 @@ def wide_console() -> Console:
 
 def print_tables(evaluation: Evaluation, reference: str | None = None, console: Console | None = None) -> None:
     """One table for each lam."""
+    from rich.markup import escape
     from rich.table import Table
 
     reference = reference or evaluation.policies[0]
@@ -89,11 +90,11 @@ def print_tables(evaluation: Evaluation, reference: str | None = None, console: 
         title = f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes"
         caption = f"means, 95 % bootstrap intervals; {reference} - policy: paired difference of returns"
         lines = f"{caption}; {describe_reference(evaluation)}", *describe_best_in_hindsight(evaluation, lam)
-        table = Table(title=title, caption="\n".join(lines))
+        table = Table(title=escape(title), caption=escape("\n".join(lines)))
         for name in table_header(evaluation, reference):
-            table.add_column(name, justify="left" if name == "policy" else "right")
+            table.add_column(escape(name), justify="left" if name == "policy" else "right")
         for row in table_rows(evaluation, lam, reference):
-            table.add_row(*row)
+            table.add_row(*map(escape, row))
         console.print(table)
 
 
