@@ -10,8 +10,10 @@ from __future__ import annotations
 import json
 import sys
 import time
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, is_dataclass
+from hashlib import sha256
 from pathlib import Path
+from shutil import rmtree
 from typing import Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -20,7 +22,6 @@ import tyro
 from stable_baselines3 import PPO
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.utils import LinearSchedule
-from stable_baselines3.common.vec_env import VecMonitor
 
 from wsn_env.agents.ppo import PPOPolicy, save_policy
 from wsn_env.cli import make_scenario
@@ -33,13 +34,14 @@ from wsn_env.evaluation.kept_blocks import remove_kept_blocks
 from wsn_env.evaluation.policies import Policy, make_policy, policy_names
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.evaluation.rollout import FIRST_SEED, evaluation_seeds
-from wsn_env.evaluation.versions import versions
+from wsn_env.evaluation.versions import sources_digest, versions
 from wsn_env.learning.actor_critic import EntryPolicy, actor_network, entry_sizes
-from wsn_env.learning.checkpoints import CHECKPOINT, Watch, load_checkpoint, save_checkpoint
+from wsn_env.learning.checkpoints import CHECKPOINT, OLD_CHECKPOINT, Watch, load_checkpoint
 from wsn_env.learning.concat_vector_env import ConcatVectorEnv
 from wsn_env.learning.defaults import default_level, default_node_counts, default_order
 from wsn_env.learning.levelling import LevelledRollout
 from wsn_env.learning.network import PolicyNetwork
+from wsn_env.learning.replayable import ReplayableRows
 from wsn_env.learning.sb3 import SB3VecEnv
 from wsn_env.learning.training_reward import TrainingReward
 from wsn_env.models.measurement.base import Order
@@ -52,6 +54,8 @@ from wsn_env.scenario import Scenario
 
 SIZED = ("nearest", "informed")  # compared with each of SIZES
 SIZES = range(9)  # further members
+FREE = ("runs", "episodes", "evaluation_seed", "checkpoint_steps", "address")  # may change in a resumed run
+BEGUN = (CHECKPOINT, OLD_CHECKPOINT, "ray.safetensors", "ray", "policy.json")  # any of them shows that a run was begun
 SLOW = ("ppo", "planner")  # left out of the comparison: the one trained is in it, the other takes hours
 
 
@@ -85,8 +89,8 @@ class Training:
     runs: Path = Path("runs")
     """Folder of all runs."""
     resume: bool = False
-    """Continue the run of this name from its last checkpoint (or begin it). The episodes after it are others than in a
-    training that was never stopped."""
+    """Continue the run of this name from its last checkpoint (or begin it). It ends with the same bits as a training
+    that was never stopped; only with --engine ray are the episodes after the checkpoint others."""
     engine: Literal["local", "ray"] = "local"
     """What trains: stable-baselines3 in this process, or RLlib with a native batch in every runner of a Ray cluster.
     The network, the rewards and the fields are the same, PPO's details are each library's own."""
@@ -172,7 +176,7 @@ def train(settings: Training) -> None:
     learn = learn_on_ray if settings.engine == "ray" else learn_locally
     network = learn(settings, scenario, interface, folder)
 
-    made = {name: value for name, value in settings_as_json(settings).items() if name not in ("name", "runs", "resume")}
+    made = {name: value for name, value in settings_as_json(settings).items() if name not in ("name", "runs")}
     facts = {"training": made, "scenario": scenario.as_dict(), "versions": versions()}
     policy = save_policy(folder, network, interface, facts)
     print(f"saved: {policy}")
@@ -205,17 +209,21 @@ def complete_settings(settings: Training) -> Scenario:
 def learn_locally(settings: Training, scenario: Scenario, interface: Settings, folder: Path) -> PolicyNetwork:
     """stable-baselines3's PPO."""
     envs = SB3VecEnv(make_envs(settings, scenario, interface, settings.rows), stagger=True)
-    model = make_model(settings, VecMonitor(envs), folder)
+    model = make_model(settings, ReplayableRows(envs))
+    facts = facts_of(settings, scenario)
+    pending = load_checkpoint(model, folder, settings.steps, facts)
     left = settings.steps - model.num_timesteps
     if left > 0:
         started, busy = time.perf_counter(), time.process_time()
-        model.set_logger(configure(str(folder / f"progress-{model.num_timesteps}"), ["tensorboard", "csv"]))
+        model.set_logger(configure(str(open_progress(folder, model.num_timesteps)), ["tensorboard", "csv"]))
+        for record in pending:
+            model.logger.record(*record)
         with progress_bar() as report:
-            callback = Watch(folder, settings.steps, settings.checkpoint_steps, report)
+            watch = Watch(folder, settings.steps, settings.checkpoint_steps, facts, report)
             try:
-                model.learn(left, callback=callback, reset_num_timesteps=False)
+                model.learn(left, callback=watch, reset_num_timesteps=False)
             finally:
-                save_checkpoint(model, folder)
+                watch.save()
         seconds = time.perf_counter() - started
         print(
             f"trained {left:,} periods in {seconds:.0f} s ({left / seconds:,.0f} a second), "
@@ -236,7 +244,9 @@ def learn_on_ray(settings: Training, scenario: Scenario, interface: Settings, fo
     training = RayTraining(
         lambda rows: make_envs(settings, scenario, interface, rows),
         entry_sizes(settings.action, whole.single_observation_space, settings.units, settings.critic),
-        folder / "ray",
+        folder,
+        steps=settings.steps,
+        facts=facts_of(settings, scenario),
         rows=settings.rows,
         runners=settings.runners,
         rollout=settings.rollout,
@@ -252,7 +262,7 @@ def learn_on_ray(settings: Training, scenario: Scenario, interface: Settings, fo
     )
     with training, progress_bar() as report:
         started, before = time.perf_counter(), training.periods
-        training.run(settings.steps, settings.checkpoint_steps, report)
+        training.run(settings.checkpoint_steps, report)
         left, seconds = training.periods - before, time.perf_counter() - started
         print(f"trained {left:,} periods in {seconds:.0f} s ({left / seconds:,.0f} a second)")
         return training.actor_network()
@@ -303,13 +313,12 @@ def open_folder(settings: Training) -> Path:
     """The run's folder with config.json; an existing run is only touched by --resume, with the same settings."""
     folder = settings.folder
     path = folder / "config.json"
-    begun = any((folder / name).exists() for name in (CHECKPOINT, "ray", "policy.json"))
-    if path.exists() and begun:
+    begun = any((folder / name).exists() for name in BEGUN)
+    if begun:
         if not settings.resume:
             raise ValueError(f"{folder} exists: --resume continues it, --name begins another, or remove it")
-        old, new = json.loads(path.read_text()), settings_as_json(settings)
-        free = {"resume", "runs", "episodes", "evaluation_seed", "checkpoint_steps", "address"}
-        differing = [name for name in new if name not in free and old.get(name) != new[name]]
+        old, new = read_config(path), settings_as_json(settings)
+        differing = [name for name in new if name not in FREE and old.get(name) != new[name]]
         if differing:
             name = differing[0]
             raise ValueError(f"{folder} was begun with {name} = {old.get(name)!r}: cannot resume it with {new[name]!r}")
@@ -319,16 +328,51 @@ def open_folder(settings: Training) -> Path:
     return folder
 
 
+def read_config(path: Path) -> dict:
+    """The settings that a run was begun with."""
+    try:
+        old = json.loads(path.read_text()) if path.is_file() else None
+    except (ValueError, RecursionError):
+        old = None
+    if not isinstance(old, dict):
+        state = "is damaged" if path.exists() else "is missing"
+        raise ValueError(f"{path} {state}: nobody knows the run's settings; --name begins another, or remove the run")
+    return old
+
+
+def facts_of(settings: Training, scenario: Scenario) -> dict[str, dict]:
+    """What a training must share with the checkpoint that it goes on from."""
+    decisive = {name: value for name, value in settings_as_json(settings).items() if name not in (*FREE, "name")}
+    kinds = {type(part).__module__ for part in vars(scenario).values() if is_dataclass(part)}
+    own = [sys.modules[kind].__file__ for kind in kinds if not kind.startswith("wsn_env.")]
+    files = [Path(file) for file in (*own, *settings.tracks) if file]
+    contents = {str(file): digest_of(file) for file in files}
+    sources = versions() | {"sources of wsn_env": sources_digest()[:16], "train.py": digest_of(Path(__file__))}
+    return {"setting": decisive, "file": contents, "version": sources}
+
+
+def digest_of(file: Path) -> str:
+    """Short, of what it holds."""
+    return sha256(file.read_bytes()).hexdigest()[:16]
+
+
+def open_progress(folder: Path, periods: int) -> Path:
+    """Where to log from so many periods on; what was logged there and beyond by one that was stopped is removed."""
+    for path in folder.glob("progress-*"):
+        begin = path.name.removeprefix("progress-")
+        if begin.isdecimal() and int(begin) >= periods:
+            rmtree(path)
+    return folder / f"progress-{periods}"
+
+
 def settings_as_json(settings: Training) -> dict:
-    """JSON values of the settings."""
-    return json.loads(json.dumps(asdict(settings), default=str))
+    """JSON values of the settings; a resumed run has those of one that was never stopped."""
+    values = json.loads(json.dumps(asdict(settings), default=str))
+    return {name: value for name, value in values.items() if name != "resume"}
 
 
-def make_model(settings: Training, envs, folder: Path) -> PPO:
-    """A new model, or the one of the last checkpoint."""
-    begun = load_checkpoint(folder, envs, settings.seed)
-    if begun is not None:
-        return begun
+def make_model(settings: Training, envs) -> PPO:
+    """A new model."""
     kind, shape = architecture(settings, envs)
     return PPO(
         kind,

@@ -4,11 +4,13 @@ import json
 import shutil
 import subprocess
 import sys
+import time
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
+import safetensors.numpy
 import torch
 
 import train
@@ -16,7 +18,9 @@ from wsn_env import ClusterVectorEnv, Scenario, View, evaluate, make_policy
 from wsn_env.agents.ppo import PPOPolicy
 from wsn_env.cli import parse_overrides
 from wsn_env.learning.actor_critic import actor_network
+from wsn_env.learning.checkpoint_file import pack, read_checkpoint, unpack, write_checkpoint
 from wsn_env.learning.network import EntryNetwork, PolicyNetwork
+from wsn_env.reports.pages.learning_curves import read_progress
 
 SET = ["particles=50", "nodes=40", "side_m=50", "crossing_m=20", "periods=10"]
 SHORT = dict(steps=4096, rows=32, rollout=32, batch=512, epochs=2, episodes=60, checkpoint_steps=1024, set=SET)
@@ -29,8 +33,33 @@ def run(tmp_path_factory) -> Path:
     return runs / "short"
 
 
+def make_model(settings):
+    """A new model as train.py makes it, and the facts of its checkpoints."""
+    scenario = train.complete_settings(settings)
+    interface = train.Settings(settings.action, "menu", settings.reward, settings.order)
+    envs = train.SB3VecEnv(train.make_envs(settings, scenario, interface, settings.rows), stagger=True)
+    return train.make_model(settings, train.ReplayableRows(envs)), train.facts_of(settings, scenario)
+
+
+def train_until(monkeypatch, periods, **settings):
+    """Ctrl-C in the middle of a rollout, so many periods after the beginning."""
+    real = train.Watch._on_step
+
+    def stop(self):
+        if self.num_timesteps >= periods:
+            raise KeyboardInterrupt
+        return real(self)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(train.Watch, "_on_step", stop)
+        with pytest.raises(KeyboardInterrupt):
+            train.train(train.Training(**settings))
+
+
 def test_a_run_leaves_its_files(run):
-    files = "config.json policy.json policy.safetensors checkpoint.zip evaluation.csv evaluation.json report.html"
+    files = (
+        "config.json policy.json policy.safetensors checkpoint.safetensors evaluation.csv evaluation.json report.html"
+    )
     for name in [*files.split(), "comparison.png"]:
         assert (run / name).stat().st_size > 0, name
     assert "<h2>Learning</h2>" in (run / "report.html").read_text()
@@ -43,9 +72,9 @@ def test_a_run_leaves_its_files(run):
 
 def test_the_saved_policy_is_the_trained_one_without_torch(run):
     """NumPy's logits are torch's; the file opens in a process that never imports torch."""
-    from stable_baselines3 import PPO
-
-    model = PPO.load(run / "checkpoint.zip")
+    settings = train.Training(name="short", runs=run.parent, **SHORT)
+    model, facts = make_model(settings)
+    train.load_checkpoint(model, run, settings.steps, facts)
     network = PolicyNetwork.load(run / "policy.safetensors")
     assert all(np.array_equal(array, actor_network(model).arrays[name]) for name, array in network.arrays.items())
     scenario = Scenario.named("PreDC-v0", **parse_overrides(SET))
@@ -77,23 +106,192 @@ def test_resume_continues_and_guards(run, tmp_path):
     assert (runs / "short" / "policy.safetensors").read_bytes() == before
 
 
-def test_a_stopped_training_goes_on(tmp_path, monkeypatch):
-    settings = dict(name="stopped", runs=tmp_path) | SHORT | dict(episodes=0)
-    real = train.Watch._on_rollout_end
+def same_files(one, other):
+    """Policy and checkpoint are the same to the byte, and so is what was logged but for times."""
+    for name in ("policy.safetensors", "checkpoint.safetensors"):
+        assert (one / name).read_bytes() == (other / name).read_bytes(), name
+    first, second = read_progress(one), read_progress(other)
+    assert first.keys() == second.keys() and len(first["time/total_timesteps"]) > 1
+    for name in first:
+        if not name.startswith("time/") or name == "time/total_timesteps":
+            assert np.array_equal(first[name], second[name], equal_nan=True), name
 
-    def stop(self):
-        real(self)
-        if self.num_timesteps >= 2048:
-            raise KeyboardInterrupt
 
-    monkeypatch.setattr(train.Watch, "_on_rollout_end", stop)
-    with pytest.raises(KeyboardInterrupt):
-        train.train(train.Training(**settings))
-    monkeypatch.setattr(train.Watch, "_on_rollout_end", real)
+def test_a_stopped_training_ends_as_one_that_was_never_stopped(run, tmp_path, monkeypatch):
+    settings = dict(name="short", runs=tmp_path) | SHORT | dict(episodes=0)
+    train_until(monkeypatch, 1500, **settings)
+    train_until(monkeypatch, 3500, **settings, resume=True)
     train.train(train.Training(**settings, resume=True))
-    steps = sorted(int(path.name.split("-")[1]) for path in (tmp_path / "stopped").glob("progress-*"))
-    assert steps == [0, 2048]
-    assert json.loads((tmp_path / "stopped" / "policy.json").read_text())["training"]["steps"] == 4096
+    same_files(run, tmp_path / "short")
+    steps = sorted(int(path.name.split("-")[1]) for path in (tmp_path / "short").glob("progress-*"))
+    assert steps == [0, 1024, 3072]
+    assert json.loads((tmp_path / "short" / "policy.json").read_text())["training"]["steps"] == 4096
+
+
+def test_so_does_one_with_episodes_of_several_lengths_that_end_outside(tmp_path, monkeypatch):
+    world = ["particles=50", "nodes=40", "side_m=40", "crossing_m=20", "periods=10", "ends_outside=True"]
+    settings = dict(name="short", action="subset", network="flat", set=world, vary=["nodes=30,periods=7"])
+    settings |= dict(steps=1536, rows=16, rollout=16, batch=128, epochs=2, episodes=0, checkpoint_steps=512)
+    train.train(train.Training(**settings, runs=tmp_path / "whole"))
+    train_until(monkeypatch, 1, **settings, runs=tmp_path / "stopped")
+    train_until(monkeypatch, 700, **settings, runs=tmp_path / "stopped", resume=True)
+    train.train(train.Training(**settings, runs=tmp_path / "stopped", resume=True))
+    same_files(tmp_path / "whole" / "short", tmp_path / "stopped" / "short")
+
+
+def test_so_does_one_that_was_killed(run, tmp_path):
+    """Also with another checkpoint_steps, before the training's end or after it."""
+    settings = SHORT | dict(episodes=0, checkpoint_steps=1)
+    options = [f"--{name.replace('_', '-')}={value}" for name, value in settings.items() if name != "set"]
+    command = [sys.executable, train.__file__, "--name=short", f"--runs={tmp_path}", *options, "--set", *SET]
+    checkpoint = tmp_path / "short" / "checkpoint.safetensors"
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        while not checkpoint.exists() and process.poll() is None:
+            time.sleep(0.01)
+        process.kill()
+    assert checkpoint.exists() and not (tmp_path / "short" / "policy.json").exists()
+    train.train(train.Training(name="short", runs=tmp_path, resume=True, **settings))
+    same_files(run, tmp_path / "short")
+
+
+def resume(runs, **changed):
+    """Its message."""
+    with pytest.raises(ValueError) as caught:
+        train.train(train.Training(name="short", runs=runs, resume=True, **(SHORT | changed)))
+    assert "\n" not in str(caught.value) and len(str(caught.value)) < 1000
+    return str(caught.value)
+
+
+def cut(share):
+    return lambda content: content[: int(share * len(content))]
+
+
+def flip(share):
+    def flipped(content):
+        place = int(share * len(content))
+        return content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :]
+
+    return flipped
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [cut(0), cut(0.001), cut(0.5), cut(0.999), *map(flip, (0, 0.0002, 0.001, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.999))]
+    + [lambda content: b"PK\x03\x04" + content, lambda content: content + b" ", lambda content: b"[]" * 1000]
+    + [lambda content: safetensors.numpy.save({"a": np.zeros(3)})]
+    + [lambda content: safetensors.numpy.save({"a": np.zeros(3)}, {"checkpoint": "[" * 10**5})],
+)
+def test_a_damaged_checkpoint_is_refused(run, tmp_path, damage):
+    shutil.copytree(run, tmp_path / "short")
+    path = tmp_path / "short" / "checkpoint.safetensors"
+    path.write_bytes(damage(path.read_bytes()))
+    resume(tmp_path)  # the run has moved: config.json says so
+    before = {file: file.read_bytes() for file in sorted(tmp_path.rglob("*.*")) if file.is_file()}
+    assert resume(tmp_path).startswith(f"{path} is damaged or no checkpoint: remove it to begin anew (")
+    assert before == {file: file.read_bytes() for file in sorted(tmp_path.rglob("*.*")) if file.is_file()}
+
+
+CHANGES = {
+    "far": dict(periods=10**12),
+    "further": dict(periods=1024 * 10**9),
+    "past its end": dict(periods=5120),
+    "negative": dict(periods=-1024),
+    "between updates": dict(periods=1000),
+    "true": dict(periods=True),
+    "no number": dict(periods="1024"),
+    "shape": {"policy.mlp_extractor.belief.bias": np.zeros(31, np.float32)},
+    "type": {"policy.mlp_extractor.belief.bias": np.zeros(32)},
+    "NaN": {"policy.mlp_extractor.belief.bias": np.full(32, np.nan, np.float32)},
+    "NaN moments": {"optimizer.0.exp_avg": lambda old: old * np.nan},
+    "no weights": {"policy.mlp_extractor.belief.bias": None},
+    "no generator": {"generators.torch": None},
+    "short generator": {"generators.torch": np.zeros(7, np.uint8)},
+    "generator's place": {"generators.numpy_place": np.array([10**9, 0, 0.0])},
+    "action": {"actions": lambda old: np.full_like(old, 255)},
+    "negative action": {"actions": lambda old: old.astype(np.int8) - 1},
+    "other actions": {"actions": lambda old: (old + 1) % 2},
+    "no actions": {"actions": lambda old: old[:0]},
+    "ages": {"ages": lambda old: old * 0 - 1},
+    "episodes": {"episodes": lambda old: old * 0 + 10**15},
+    "other episodes": {"episodes": lambda old: old - 1},
+    "observation": {"observation": lambda old: old + 1},
+}
+
+
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+def test_a_checkpoint_that_cannot_be_is_refused(run, tmp_path, change):
+    settings = train.Training(name="short", runs=tmp_path, **SHORT)
+    model, wanted = make_model(settings)
+    arrays, facts = read_checkpoint(run / "checkpoint.safetensors", wanted)
+    for name, value in change.items():
+        if name == "periods":
+            facts[name] = value
+        elif value is None:
+            del arrays[name]
+        else:
+            arrays[name] = value(arrays[name]) if callable(value) else value
+    path = tmp_path / "checkpoint.safetensors"
+    write_checkpoint(path, arrays, facts)
+    with pytest.raises(ValueError) as caught:
+        train.load_checkpoint(model, tmp_path, settings.steps, wanted)
+    assert str(caught.value).startswith(f"{path} does not suit this training: remove it to begin anew (")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_checkpoint_of_other_code_or_settings_is_refused(run, tmp_path, monkeypatch):
+    shutil.copytree(run, tmp_path / "short")
+    path = tmp_path / "short" / "checkpoint.safetensors"
+    now = train.versions()
+    for name, value in (("torch", "1.0"), ("wsn_env", "0.0.1"), ("python", "3.99.0")):
+        with monkeypatch.context() as patch:
+            patch.setattr(train, "versions", lambda: now | {name: value})  # noqa: B023
+            wanted = f"{path} was written with version {name} = {now[name]}, and now it is {value}: go back"
+            assert resume(tmp_path).startswith(wanted)
+    with monkeypatch.context() as patch:
+        patch.setattr(train, "sources_digest", lambda: "0" * 64)
+        assert "version sources of wsn_env" in resume(tmp_path)
+    config = tmp_path / "short" / "config.json"
+    config.write_text(config.read_text().replace('"gamma": 0.95', '"gamma": 0.5'))
+    assert resume(tmp_path, gamma=0.5).startswith(f"{path} was written with setting gamma = 0.95, and now it is 0.5")
+
+
+@pytest.mark.parametrize("content", [None, "", "[]", "null", "3", '{"steps": 4096', "[" * 10**5, b"\xff\xfe", "folder"])
+def test_a_run_without_its_settings_is_not_resumed(run, tmp_path, content):
+    shutil.copytree(run, tmp_path / "short")
+    config = tmp_path / "short" / "config.json"
+    config.unlink()
+    if content == "folder":
+        config.mkdir()
+    elif content is not None:
+        config.write_bytes(content if isinstance(content, bytes) else content.encode())
+    state = "missing" if content is None else "damaged"
+    assert resume(tmp_path).startswith(f"{config} is {state}: nobody knows the run's settings; --name begins another")
+
+
+def test_checkpoints_that_could_execute_anything_are_not_opened(run, tmp_path, capsys, monkeypatch):
+    shutil.copytree(run, tmp_path / "short")
+    (tmp_path / "short" / "checkpoint.safetensors").rename(tmp_path / "short" / "checkpoint.zip")
+    old = f"{tmp_path / 'short' / 'checkpoint.zip'}: checkpoints of this kind can execute anything and are not read"
+    assert resume(tmp_path).startswith(old)
+    options = [f"--{name.replace('_', '-')}={value}" for name, value in SHORT.items() if name != "set"]
+    command = ["train.py", "--resume", "--name=short", f"--runs={tmp_path}", *options, "--set", *SET]
+    monkeypatch.setattr(sys, "argv", command)
+    assert train.main() == 2
+    said = capsys.readouterr().err
+    assert said.splitlines()[-1].startswith(f"train.py: {old}")
+
+
+def periods_of(checkpoint):
+    return read_checkpoint(checkpoint, {})[1]["periods"]
+
+
+def test_a_tree_of_plain_values_and_arrays_is_kept_as_it_is():
+    tree = {"a": {0: (1, 2.5, None), 1: [True, "x", {}]}, "lr": [(0.9, float("nan"))], "b": (), "c": []}
+    arrays, plain = pack(tree | {"w": np.arange(3, dtype=np.int16), "n": np.float64(0.1)})
+    again = unpack(arrays, json.loads(json.dumps(plain)))
+    assert again.pop("w").dtype == np.int16 and again.pop("n") == 0.1 and repr(again) == repr(tree)
+    with pytest.raises(TypeError, match="function"):
+        pack({"a": print})
 
 
 @pytest.mark.slow
@@ -115,13 +313,13 @@ def test_rllib_trains_the_same_network_and_goes_on_where_it_was_stopped(tmp_path
         with pytest.raises(KeyboardInterrupt):
             train.train(train.Training(**settings))
     folder = tmp_path / "short"
-    half = json.loads((folder / "ray" / "periods.json").read_text())
+    half = periods_of(folder / "ray.safetensors")
     assert SHORT["steps"] // 2 <= half < SHORT["steps"] and not (folder / "policy.json").exists()
     with pytest.raises(ValueError, match="--resume"):
         train.train(train.Training(**settings))
     train.train(train.Training(**settings, resume=True))
-    assert json.loads((folder / "ray" / "periods.json").read_text()) >= SHORT["steps"]
-    left = {"config.json", "policy.json", "policy.safetensors", "ray", "report.html"}
+    assert periods_of(folder / "ray.safetensors") >= SHORT["steps"]
+    left = {"config.json", "policy.json", "policy.safetensors", "ray.safetensors", "report.html"}
     assert {path.name for path in folder.iterdir()} == left
     network = PolicyNetwork.load(folder / "policy.safetensors")
     assert isinstance(network, EntryNetwork) and network.sizes["outputs"] == 1
@@ -132,10 +330,6 @@ def test_rllib_trains_the_same_network_and_goes_on_where_it_was_stopped(tmp_path
 def test_damaged_files_say_so(run, tmp_path):
     runs = tmp_path / "runs"
     shutil.copytree(run, runs / "short")
-    checkpoint = runs / "short" / "checkpoint.zip"
-    checkpoint.write_bytes(checkpoint.read_bytes()[: checkpoint.stat().st_size // 2])
-    with pytest.raises(ValueError, match="cut short"):
-        train.train(train.Training(name="short", runs=runs, resume=True, **SHORT))
     scenario = Scenario.named("PreDC-v0", **parse_overrides(SET))
     weights = runs / "short" / "policy.safetensors"
     weights.write_bytes(weights.read_bytes()[:-100])
@@ -153,13 +347,9 @@ def test_damaged_files_say_so(run, tmp_path):
 @pytest.mark.parametrize("asked, level", [({}, 1.0), ({"level": 0.0}, 0.0), ({"scenario": "Rssi-v0"}, 0.0)])
 def test_advantages_are_levelled_as_asked_for_or_where_nodes_measure_positions(asked, level):
     settings = train.Training(**asked)
-    scenario = train.complete_settings(settings)
-    interface = train.Settings(action="menu", observation="menu", reward="belief", order=settings.order)
-    envs = train.VecMonitor(
-        train.SB3VecEnv(train.make_envs(settings, scenario, interface, settings.rows), stagger=True)
-    )
-    buffer = train.make_model(settings, envs, Path("nowhere")).rollout_buffer
-    buffer.observations[0, :, :] = envs.reset()
+    model = make_model(settings)[0]
+    buffer = model.rollout_buffer
+    buffer.observations[0, :, :] = model.get_env().reset()
     buffer.rewards[0] = 1.0 + np.arange(buffer.n_envs)
     before = buffer.rewards.copy()
     buffer.compute_returns_and_advantage(torch.zeros(buffer.n_envs), np.ones(buffer.n_envs))

@@ -210,6 +210,12 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         infos |= _mask_info(info)
         return self._observe(ended), reward, terminated, truncated, infos
 
+    def skip_episodes(self, counts: np.ndarray) -> None:
+        """Let each row's generator pass over so many episodes (B,), as if they had been played."""
+        for generator, count in zip(self._generators, counts.tolist()):
+            for _ in range(count):
+                draws.episode_key(cast(np.random.Generator, generator))
+
     @property
     def lam(self) -> np.ndarray:
         """(B,) the present episodes' trade-offs [m/mJ]."""

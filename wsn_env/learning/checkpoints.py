@@ -1,4 +1,9 @@
-"""Checkpoints of stable-baselines3's PPO, and what a training tells and keeps on its way."""
+"""Checkpoints of stable-baselines3's PPO, and what a training tells and keeps on its way.
+
+A checkpoint is taken between two updates. It holds all that decides how the training goes on: weights, optimizer,
+generators, running sums, and of each row how many episodes it has begun and the actions since, which are played again.
+A training that goes on from it is to the bit one that was never stopped.
+"""
 
 from __future__ import annotations
 
@@ -8,72 +13,188 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 from stable_baselines3 import PPO
-from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 
-from wsn_env.evaluation.files import replacing
+from wsn_env.learning.checkpoint_file import read_checkpoint, refuse_executable, unsuitable, write_checkpoint
+from wsn_env.learning.levelling import LevelledRollout
+from wsn_env.learning.replayable import ReplayableRows
 
-CHECKPOINT = "checkpoint.zip"
+CHECKPOINT = "checkpoint.safetensors"
+OLD_CHECKPOINT = "checkpoint.zip"
+GENERATORS = "generators.torch", "generators.numpy", "generators.numpy_place"
+WINDOWS = {"episodes.r": np.float32, "episodes.l": np.int32, "episodes.rms_m": np.float64}  # of the last episodes
+PENDING = "pending."  # what the last update has told, to be logged with the next rollout
 
 
-def save_checkpoint(model: BaseAlgorithm, folder: Path) -> None:
-    """Whole or not at all."""
-    with replacing(folder / CHECKPOINT) as path, open(path, "wb") as file:
-        model.save(file)
+def take_checkpoint(model: PPO) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """Copies of its arrays, and facts, between two updates."""
+    rows = _rows_of(model)
+    mt19937: Any = np.random.get_state()
+    last = list(model.ep_info_buffer or ())
+    windows = [info["r"] for info in last], [info["l"] for info in last], list(rows.rms_m)
+    arrays = {name: array.copy() for name, array in _live_arrays(model).items()}
+    arrays |= {name: np.array(values, kind) for (name, kind), values in zip(WINDOWS.items(), windows)}
+    arrays |= zip(GENERATORS, (torch.get_rng_state().numpy(), mt19937[1].copy(), np.array(mt19937[2:])))
+    arrays |= {"actions": rows.recent_actions(), "observation": np.array(model._last_obs)}
+    logger: Any = model.logger
+    arrays |= {PENDING + name: np.array(value) for name, value in logger.name_to_value.items()}
+    excluded = {name: list(logger.name_to_excluded[name]) for name in logger.name_to_value}
+    return arrays, {"periods": model.num_timesteps, "excluded": excluded}
 
 
-def load_checkpoint(folder: Path, envs: Any, seed: int) -> PPO | None:
-    """The model of the last checkpoint, if there is one; its episodes are others than before.
+def load_checkpoint(
+    model: PPO, folder: Path, steps: int, facts: dict[str, dict[str, Any]]
+) -> list[tuple[str, Any, Any]]:
+    """Bring a new model to the last checkpoint, if there is one.
 
     Args:
-        envs: what it goes on in.
-        seed: of the training.
+        model: of ReplayableRows, which have been seeded.
+        steps: of the whole training.
+        facts: what the checkpoint must have been written with.
+
+    Returns: what its logger is to record.
 
     Raises:
-        ValueError: the file is damaged.
+        ValueError: the file is damaged, of something else, or one that could execute anything.
     """
     path = folder / CHECKPOINT
+    refuse_executable(folder / OLD_CHECKPOINT, path)
     if not path.exists():
-        return None
+        return []
+    arrays, found = read_checkpoint(path, facts)
     try:
-        model = PPO.load(path, env=envs)
-    except Exception as problem:  # zipfile, pickle and torch raise all kinds for a damaged file
-        raise ValueError(f"{path} is cut short or no checkpoint: remove it to begin anew ({problem!r})") from None
-    envs.seed(seed + model.num_timesteps)
-    return model
+        _restore(model, arrays, found, steps)
+        excluded = found["excluded"]
+        return [
+            (name.removeprefix(PENDING), array[()], tuple(excluded[name.removeprefix(PENDING)]))
+            for name, array in arrays.items()
+            if name.startswith(PENDING)
+        ]
+    except (LookupError, TypeError, ValueError, AttributeError, RuntimeError) as problem:
+        raise unsuitable(path, problem) from None
+
+
+def _restore(model: PPO, arrays: dict[str, np.ndarray], facts: dict[str, Any], steps: int) -> None:
+    rows = _rows_of(model)
+    periods, rollout = facts["periods"], model.n_steps * model.n_envs
+    if type(periods) is not int or periods % rollout or not 0 <= periods < steps + rollout:
+        raise ValueError(f"periods = {periods!r}: must be a multiple of {rollout} below {steps + rollout}")
+    model.num_timesteps, model._n_updates = periods, periods // rollout * model.n_epochs
+    if periods:  # as Adam begins with its first step
+        for weight in model.policy.parameters():
+            moments = {name: torch.zeros_like(weight) for name in ("exp_avg", "exp_avg_sq")}
+            model.policy.optimizer.state[weight] = {"step": torch.zeros(()), **moments}
+    live = _live_arrays(model)
+    for name, array in live.items():
+        _check_like(name, arrays[name], array.dtype, array.shape)
+        if not np.isfinite(arrays[name]).all():
+            raise ValueError(f"{name} is not finite")
+    for name, kind in WINDOWS.items():
+        _check_like(name, arrays[name], kind, (arrays[name].size,))
+    place: Any = rows.replay(arrays["episodes"], arrays["ages"], arrays["actions"], periods // model.n_envs)
+    if not np.array_equal(place, arrays["observation"]):
+        raise ValueError("its episodes do not come to the same observations here")
+    model._last_obs, model._last_episode_starts = place, arrays["ages"] == 0
+    for name, array in live.items():
+        array[...] = arrays[name]
+    returns, lengths, rms_m = (arrays[name] for name in WINDOWS)
+    last = [{"r": r, "l": length} for r, length in zip(returns, lengths)]
+    model.ep_info_buffer, model.ep_success_buffer = (deque(own, model._stats_window_size) for own in (last, []))
+    rows.rms_m.extend(rms_m.tolist())
+    of_torch, of_numpy, drawn = (arrays[name] for name in GENERATORS)
+    torch.set_rng_state(torch.from_numpy(of_torch))
+    _check_like(GENERATORS[1], of_numpy, np.uint32, (624,))
+    if not 0 <= drawn[0] <= len(of_numpy):
+        raise ValueError(f"{GENERATORS[2]} = {drawn}: must be at most {len(of_numpy)}")
+    np.random.set_state(("MT19937", of_numpy, int(drawn[0]), int(drawn[1]), float(drawn[2])))
+
+
+def _live_arrays(model: PPO) -> dict[str, np.ndarray]:
+    """Everything that is restored in place, by name; none is a copy."""
+    rows, policy, buffer = _rows_of(model), model.policy, model.rollout_buffer
+    assert isinstance(buffer, LevelledRollout)
+    arrays = {f"policy.{name}": tensor.numpy() for name, tensor in policy.state_dict().items()}
+    for i, weight in enumerate(policy.parameters()):
+        moments = policy.optimizer.state.get(weight, {})
+        arrays |= {f"optimizer.{i}.{name}": tensor.numpy() for name, tensor in moments.items()}
+    arrays |= {f"errors.{i}": sums for i, sums in enumerate(rows.error_sums())}
+    arrays |= {"levelling": buffer.levelling.sums}
+    return arrays | {"episodes": rows.episodes, "ages": rows.episode_lengths, "returns": rows.episode_returns}
+
+
+def _rows_of(model: PPO) -> ReplayableRows:
+    rows = model.get_env()
+    if not isinstance(rows, ReplayableRows):
+        raise TypeError("a checkpoint needs ReplayableRows")
+    return rows
+
+
+def _check_like(name: str, array: np.ndarray, kind: Any, shape: tuple[int, ...]) -> None:
+    if array.dtype != kind or array.shape != shape:
+        raise ValueError(f"{name} is {array.dtype} of shape {array.shape}: must be {np.dtype(kind)} of shape {shape}")
 
 
 class Watch(BaseCallback):
-    """Progress and checkpoints.
+    """Progress and checkpoints: one every `checkpoint_steps` and, by `save`, that of the last update.
 
     Args:
         folder: for checkpoints.
         steps: of the whole training.
         checkpoint_steps: between two checkpoints.
+        facts: what a training must share to go on from them.
         report: is called with steps done, all of them and how it goes.
     """
 
-    def __init__(self, folder: Path, steps: int, checkpoint_steps: int, report: Callable[[int, int, str], Any]) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        steps: int,
+        checkpoint_steps: int,
+        facts: dict[str, dict[str, Any]],
+        report: Callable[[int, int, str], Any],
+    ) -> None:
         super().__init__()
-        self._folder, self._steps, self._checkpoint_steps, self._report = folder, steps, checkpoint_steps, report
-        self._saved = 0
-        self._rms: deque[float] = deque(maxlen=200)  # episodes
+        self._path, self._steps, self._checkpoint_steps = folder / CHECKPOINT, steps, checkpoint_steps
+        self._facts, self._report = facts, report
+        self._taken: tuple[dict[str, np.ndarray], dict[str, Any]] | None = None
+
+    def save(self) -> None:
+        """Write the checkpoint of the last update."""
+        if self._taken is not None:
+            arrays, facts = self._taken
+            write_checkpoint(self._path, arrays, facts | self._facts)
+            self._saved = facts["periods"]
+
+    def _take(self) -> None:
+        model = self.model
+        assert isinstance(model, PPO)
+        self._taken = take_checkpoint(model)
+
+    def _on_training_start(self) -> None:
+        self._saved = self.num_timesteps
+
+    def _on_rollout_start(self) -> None:
+        self._take()
+        if self.num_timesteps - self._saved >= self._checkpoint_steps:
+            self.save()
+
+    def _on_training_end(self) -> None:
+        self._take()
 
     def _on_step(self) -> bool:
-        self._rms.extend(info["episode_rms_m"] for info in self.locals["infos"] if "episode_rms_m" in info)
         return True
 
     def _on_rollout_end(self) -> None:
-        rms, error = mean_and_error(self._rms)
+        model = self.model
+        assert isinstance(model, PPO)
+        rms, error = mean_and_error(_rows_of(model).rms_m)
         self.logger.record("rollout/episode_rms_m", rms)
         self.logger.record("rollout/episode_rms_se_m", error)
         rewards = [info["r"] for info in self.model.ep_info_buffer or ()]
         self.logger.record("rollout/ep_rew_se", mean_and_error(rewards)[1])
         self._report(min(self.num_timesteps, self._steps), self._steps, f"training, RMS {rms:.2f} m")
-        if self.num_timesteps - self._saved >= self._checkpoint_steps:
-            save_checkpoint(self.model, self._folder)
-            self._saved = self.num_timesteps
 
 
 def mean_and_error(values: Collection[float]) -> tuple[float, float]:

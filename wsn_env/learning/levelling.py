@@ -31,7 +31,7 @@ class Levelling:
     def __init__(self, level: float) -> None:
         self._level = level
         # Transitions so far and the sums of their squared advantages, by width.
-        self._sums = np.zeros((2, 1 + round(2 * BOUND * STEPS)))
+        self.sums: np.ndarray = np.zeros((2, 1 + round(2 * BOUND * STEPS)))
 
     def __call__(self, observations: np.ndarray, advantages: np.ndarray) -> np.ndarray:
         """Of a rollout.
@@ -44,10 +44,10 @@ class Levelling:
         """
         width = np.rint(STEPS * (observations[..., WIDTH] + BOUND)).astype(int)
         squares = advantages.astype(float) ** 2
-        self._sums *= MEMORY
-        for sums, weights in zip(self._sums, (np.ones_like(squares), squares)):
+        self.sums *= MEMORY
+        for sums, weights in zip(self.sums, (np.ones_like(squares), squares)):
             sums += np.bincount(width.ravel(), weights.ravel(), len(sums))
-        met, summed = self._sums
+        met, summed = self.sums
         size = np.sqrt((summed + PRIOR_TRANSITIONS * summed.sum() / met.sum()) / (met + PRIOR_TRANSITIONS))
         return (advantages / size[width] ** self._level).astype(np.float32)
 
@@ -61,10 +61,10 @@ class LevelledRollout(RolloutBuffer):
     """
 
     def __init__(self, *args: Any, level: float = 0.0, **kwargs: Any) -> None:
-        self._levelling = Levelling(level)
+        self.levelling: Levelling = Levelling(level)
         super().__init__(*args, **kwargs)
 
     def compute_returns_and_advantage(self, last_values: torch.Tensor, dones: np.ndarray) -> None:
         """As RolloutBuffer, then level."""
         super().compute_returns_and_advantage(last_values, dones)
-        self.advantages: np.ndarray = self._levelling(self.observations, self.advantages)
+        self.advantages: np.ndarray = self.levelling(self.observations, self.advantages)

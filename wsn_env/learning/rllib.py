@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -26,11 +24,20 @@ from ray.tune.registry import register_env
 from wsn_env.evaluation.progress import Progress
 from wsn_env.evaluation.ray_engine import connect
 from wsn_env.learning.actor_critic import EntryActorCritic
+from wsn_env.learning.checkpoint_file import (
+    pack,
+    read_checkpoint,
+    refuse_executable,
+    unpack,
+    unsuitable,
+    write_checkpoint,
+)
 from wsn_env.learning.levelling import Levelling
 from wsn_env.learning.native_runner import NativeRunner
 from wsn_env.learning.network import EntryNetwork
 
-PERIODS = "periods.json"
+RAY_CHECKPOINT = "ray.safetensors"
+OLD_RAY_CHECKPOINT = "ray"
 FIRST_S = 900.0  # a rollout may take so long: runners compile their kernels in the first
 
 
@@ -98,6 +105,8 @@ class RayTraining:
         make_rows: how many -> native vector environment in disabled autoreset mode, with the training's rewards.
         entries: arguments of EntryActorCritic.
         folder: of the checkpoint.
+        steps: of the whole training.
+        facts: what it must share with the checkpoint that it goes on from.
         rows: over all runners.
         runners: processes that step environments, a core each; 0: none but this one.
         rollout: periods of each row between two updates.
@@ -113,6 +122,8 @@ class RayTraining:
         entries: dict[str, Any],
         folder: Path,
         *,
+        steps: int,
+        facts: dict[str, dict[str, Any]],
         rows: int,
         runners: int,
         rollout: int,
@@ -122,10 +133,15 @@ class RayTraining:
         **training: Any,
     ) -> None:
         self.periods: int = 0
-        self._folder = folder
+        self._path, self._steps = folder / RAY_CHECKPOINT, steps
+        self._facts = facts | {"version": facts["version"] | {"ray": ray.__version__}}
+        refuse_executable(folder / OLD_RAY_CHECKPOINT, self._path)
+        saved = read_checkpoint(self._path, self._facts) if self._path.exists() else None
         connect(address)
         register_env("wsn_env", lambda context: _OwnSeeds(make_rows(context["num_envs"]), seed))
         each = rows // max(runners, 1)
+        batch = rollout * each * max(runners, 1)
+        self._most = steps + batch
         self._algorithm = (
             PPOConfig()
             .environment("wsn_env")
@@ -141,7 +157,7 @@ class RayTraining:
             .training(
                 learner_class=LevelledLearner,
                 learner_config_dict={"level": level},
-                train_batch_size_per_learner=rollout * each * max(runners, 1),
+                train_batch_size_per_learner=batch,
                 use_kl_loss=False,
                 vf_clip_param=float("inf"),
                 clip_param=0.2,
@@ -152,9 +168,12 @@ class RayTraining:
             .rl_module(rl_module_spec=RLModuleSpec(module_class=EntryModule, model_config={"entries": entries}))
             .debugging(seed=seed, log_level="ERROR")
         ).build_algo()
-        if folder.exists():
-            self._algorithm.restore_from_path(str(folder.absolute()))
-            self.periods = json.loads((folder / PERIODS).read_text())
+        if saved is not None:
+            try:
+                self._restore(*saved)
+            except BaseException:
+                self.__exit__()
+                raise
 
     def __enter__(self) -> RayTraining:
         return self
@@ -163,16 +182,26 @@ class RayTraining:
         self._algorithm.stop()
         ray.shutdown()
 
-    def run(self, steps: int, checkpoint_steps: int, progress: Progress) -> None:
-        """Train up to so many periods in all; a checkpoint every `checkpoint_steps`, and whatever ends it."""
+    def _restore(self, arrays: dict[str, np.ndarray], facts: dict[str, Any]) -> None:
+        periods = facts.get("periods")
+        try:
+            if type(periods) is not int or not 0 <= periods < self._most:
+                raise ValueError(f"periods = {periods!r}: must be below {self._most}")
+            self._algorithm.set_state(unpack(arrays, facts["state"]))
+        except Exception as problem:  # RLlib looks into the state here and there
+            raise unsuitable(self._path, problem) from None
+        self.periods = periods
+
+    def run(self, checkpoint_steps: int, progress: Progress) -> None:
+        """Train to the end; a checkpoint every `checkpoint_steps`, and whatever ends it."""
         saved = self.periods
         try:
-            while self.periods < steps:
+            while self.periods < self._steps:
                 result = self._algorithm.train()
                 self.periods = int(result["num_env_steps_sampled_lifetime"])
                 # Without "env_runners": all of them were lost, or late; they sample in the next turn.
                 reward = result.get("env_runners", {}).get("episode_return_mean", float("nan"))
-                progress(min(self.periods, steps), steps, f"training, reward {reward:.1f}")
+                progress(min(self.periods, self._steps), self._steps, f"training, reward {reward:.1f}")
                 if self.periods - saved >= checkpoint_steps:
                     self._save()
                     saved = self.periods
@@ -180,16 +209,8 @@ class RayTraining:
             self._save()
 
     def _save(self) -> None:
-        """Whole or not at all."""
-        new, old = (self._folder.with_name(f"{self._folder.name}.{word}") for word in ("new", "old"))
-        for folder in (new, old):
-            shutil.rmtree(folder, ignore_errors=True)
-        self._algorithm.save_to_path(str(new.absolute()))
-        (new / PERIODS).write_text(json.dumps(self.periods))
-        if self._folder.exists():
-            self._folder.rename(old)
-        new.rename(self._folder)
-        shutil.rmtree(old, ignore_errors=True)
+        arrays, state = pack(self._algorithm.get_state())
+        write_checkpoint(self._path, arrays, {"periods": self.periods, "state": state} | self._facts)
 
     def actor_network(self) -> EntryNetwork:
         """The actor as NumPy arrays."""

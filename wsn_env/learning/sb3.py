@@ -40,9 +40,10 @@ class SB3VecEnv(VecEnv):
         self.envs = envs
         self.seconds: float = 0.0  # wall time spent in step and reset
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
+        self._parts = [part.unwrapped for part in getattr(self._native, "parts", [envs])]
         self._first_end = np.full(envs.num_envs, -1)
         if stagger:
-            parts = [part.unwrapped for part in getattr(self._native, "parts", [envs])]
+            parts = self._parts
             ends = [1 + np.arange(part.num_envs) * part.scenario.periods // part.num_envs for part in parts]
             self._first_end = np.concatenate(ends)
         self._steps = 0
@@ -87,6 +88,49 @@ class SB3VecEnv(VecEnv):
                 observation, _ = self.envs.reset(options={"reset_mask": done})
         # A copy of the rewards: stable-baselines3 adds the bootstrapped value in place.
         return observation, rewards.astype(np.float32), done, infos
+
+    @property
+    def periods(self) -> int:
+        """Of the longest episodes."""
+        return max(part.scenario.periods for part in self._parts)
+
+    def replay(self, episodes: np.ndarray, ages: np.ndarray, actions: np.ndarray, steps: int) -> VecEnvObs:
+        """Play what the present episodes of other rows of these seeds were, to the same bits. Disabled mode only.
+
+        Args:
+            episodes: (B,) begun by each row.
+            ages: (B,) periods of the present ones.
+            actions: (T, B, ...) of the last T periods, T the oldest age.
+            steps: periods since reset() there.
+
+        Returns: the observations of the last of these periods.
+        """
+        seeds = list(self._seeds)
+        observation = self.reset()
+        for t in range(len(actions) + 1):
+            begins = ages == len(actions) - t
+            if begins.any():
+                observation = self._begin(begins, seeds, episodes)
+            if t < len(actions):
+                observation, _, terminated, truncated, _ = self.envs.step(actions[t])
+                # Rows whose episode begins later may end one of which nobody wants to know.
+                ended = terminated | truncated
+                if ended.any():
+                    observation, _ = self.envs.reset(options={"reset_mask": ended})
+        self._steps = steps
+        return observation
+
+    def _begin(self, rows: np.ndarray, seeds: list[Any], episodes: np.ndarray) -> VecEnvObs:
+        """Begin so manieth episodes of their seeds in some rows."""
+        own: Any = [seed if row else None for seed, row in zip(seeds, rows)]
+        observation, _ = self.envs.reset(seed=own, options={"reset_mask": rows})
+        later = rows & (episodes > 1)
+        if later.any():
+            counts = np.where(later, episodes - 2, 0)
+            for part, skipped in zip(self._parts, np.split(counts, np.cumsum([p.num_envs for p in self._parts])[:-1])):
+                part.skip_episodes(skipped)
+            observation, _ = self.envs.reset(options={"reset_mask": later})
+        return observation
 
     def close(self) -> None:
         """Close the environments."""

@@ -36,7 +36,7 @@ class TrainingReward(gym.vector.VectorWrapper):
         super().__init__(envs)
         self._scaled, self._calibrated = scaled, calibrated
         # Sums of true errors, and of what the rewards took for them, by width; at first they agree.
-        self._errors = np.full((2, len(WIDTHS)), PRIOR_M)
+        self.errors: np.ndarray = np.full((2, len(WIDTHS)), PRIOR_M)
 
     def step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """One period; the rewards are float32 copies."""
@@ -51,6 +51,6 @@ class TrainingReward(gym.vector.VectorWrapper):
         """(B,) true over believed errors, after those of this period. Rows that only begin have neither."""
         width = np.log2(np.maximum(info["posterior_rms_m"] / scenario.typical_error_m, 1e-9))
         nearest = abs(WIDTHS[:, None] - width).argmin(axis=0)
-        for sums, errors in zip(self._errors, (info["error_m"], -info["reward_error"])):
+        for sums, errors in zip(self.errors, (info["error_m"], -info["reward_error"])):
             sums += np.bincount(nearest, errors, len(WIDTHS))
-        return np.interp(width, WIDTHS, self._errors[0] / self._errors[1])
+        return np.interp(width, WIDTHS, self.errors[0] / self.errors[1])
