@@ -348,7 +348,13 @@ def facts_of(settings: Training, scenario: Scenario) -> dict[str, dict]:
     files = [Path(file) for file in (*own, *settings.tracks) if file]
     contents = {str(file): digest_of(file) for file in files}
     sources = versions() | {"sources of wsn_env": sources_digest()[:16], "train.py": digest_of(Path(__file__))}
-    return {"setting": decisive, "file": contents, "version": sources}
+    world = json.loads(json.dumps(scenario.as_dict(), default=str))
+    quantities: dict = {}
+    for part, value in world.items():
+        quantities |= (
+            {f"{part}.{name}": one for name, one in value.items()} if isinstance(value, dict) else {part: value}
+        )
+    return {"setting": decisive, "quantity": quantities, "file": contents, "version": sources}
 
 
 def digest_of(file: Path) -> str:

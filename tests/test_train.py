@@ -250,6 +250,10 @@ def test_a_checkpoint_of_other_code_or_settings_is_refused(run, tmp_path, monkey
     with monkeypatch.context() as patch:
         patch.setattr(train, "sources_digest", lambda: "0" * 64)
         assert "version sources of wsn_env" in resume(tmp_path)
+    with monkeypatch.context() as patch:
+        preset = Scenario.named("PreDC-v0", decay_power=2.5)
+        patch.setattr(train, "make_scenario", lambda *_: preset.override(**parse_overrides(SET)))
+        assert "quantity detection.decay_power = " in resume(tmp_path)
     config = tmp_path / "short" / "config.json"
     config.write_text(config.read_text().replace('"gamma": 0.95', '"gamma": 0.5'))
     assert resume(tmp_path, gamma=0.5).startswith(f"{path} was written with setting gamma = 0.95, and now it is 0.5")
