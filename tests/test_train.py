@@ -154,8 +154,16 @@ def test_so_does_one_that_was_killed(run, tmp_path):
     same_files(run, tmp_path / "short")
 
 
+def test_what_a_stopped_training_logged_after_its_checkpoint_is_removed(tmp_path):
+    for name in ("progress-0", "progress-1024", "progress-2048", "progress-old", "notes"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "progress.csv").write_text("a\n1\n")
+    assert train.open_progress(tmp_path, 1024) == tmp_path / "progress-1024"
+    assert {path.name for path in tmp_path.iterdir()} == {"progress-0", "progress-old", "notes"}
+
+
 def resume(runs, **changed):
-    """Its message."""
+    """The message with which a run is not resumed."""
     with pytest.raises(ValueError) as caught:
         train.train(train.Training(name="short", runs=runs, resume=True, **(SHORT | changed)))
     assert "\n" not in str(caught.value) and len(str(caught.value)) < 1000
