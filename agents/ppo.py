@@ -40,8 +40,7 @@ class PPOPolicy(ViewPolicy):
 
     def __getstate__(self) -> dict[str, Any]:
         """It takes its network along to machines that lack the file."""
-        assert self._interface_and_network
-        return self.__dict__
+        return self.__dict__ | {"_interface_and_network": self._interface_and_network}
 
     @cached_property
     def _interface_and_network(self) -> tuple[Interface, FlatNetwork | EntryNetwork]:
