@@ -201,7 +201,7 @@ def run_evaluate(command: Evaluate) -> None:
             engine=on_ray(command.address) if command.engine == "ray" else None,
         )
     names: list[str] = []
-    if command.out:
+    if command.out:  # first: whatever the terminal is, nothing is lost
         evaluation.save(command.out)
         save_markdown(evaluation, command.out)
         names = ["evaluation.csv", "evaluation.json", "evaluation.md", *(FRONT_FILES if command.pareto else ())]

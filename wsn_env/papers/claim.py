@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from wsn_env.evaluation.files import replacing
 from wsn_env.papers.sheet import Sheet, write_sheet
@@ -118,7 +118,7 @@ def print_claims(claims: Iterable[Claim], title: str = "Claims", source: str = "
     for column in ("claim", source, "ours", "verdict"):
         table.add_column(column)
     for c in claims:
-        table.add_row(escape(c.claim), escape(c.paper), escape(c.ours), f"[{COLOURS[c.verdict]}]{c.verdict}[/]")
+        table.add_row(c.claim, c.paper, c.ours, Text(c.verdict, style=COLOURS[c.verdict]))
     wide_console().print(table)
 
 
@@ -128,4 +128,4 @@ def print_expected(expected: Sequence[Expectation]) -> None:
     wide_console().print(f"Expected figures: {len(expected) - len(missed)} of {len(expected)} within their tolerance.")
     for e in missed:
         text = f"  missed: {e.quantity}: {e.measured:.4g}, expected {e.expected:.4g} +- {e.tolerance:.2g}"
-        wide_console().print(escape(text))
+        wide_console().print(text)

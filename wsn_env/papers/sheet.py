@@ -12,7 +12,6 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
-from rich.markup import escape
 from rich.table import Table
 
 from wsn_env.evaluation.files import replacing
@@ -93,11 +92,11 @@ def show_table(
     rows = list(rows)
     with replacing(path) as temporary:
         temporary.write_text(markdown_table(columns, rows) + (f"\n{caption}\n" if caption else ""), encoding="utf-8")
-    table = Table(title=escape(title), caption=escape(caption or ""), title_justify="left", caption_justify="left")
+    table = Table(title=title, caption=caption or "", title_justify="left", caption_justify="left")
     for i, column in enumerate(columns):
-        table.add_column(escape(column), justify="right" if i else "left")
+        table.add_column(column, justify="right" if i else "left")
     for row in rows:
-        table.add_row(*map(escape, row))
+        table.add_row(*row)
     wide_console().print(table)
 
 

@@ -35,10 +35,9 @@ def save_and_print_fronts(evaluation: Evaluation, out: Path | None = None) -> No
 
 def print_front(evaluation: Evaluation, found: Fronts) -> None:
     """A row for every point."""
-    from rich.markup import escape
     from rich.table import Table
 
-    table = Table(title=escape(front_title(evaluation)), caption="means with 95 % bootstrap intervals")
+    table = Table(title=front_title(evaluation), caption="means with 95 % bootstrap intervals")
     for column in ("policy", "lam m/mJ", "mean error m", "energy mJ/period"):
         table.add_column(column, justify="left" if column == "policy" else "right")
     fine, small = map(_digits, reference_point(evaluation.scenario))
@@ -46,18 +45,17 @@ def print_front(evaluation: Evaluation, found: Fronts) -> None:
         for point in points:
             lam = "any" if point.lam is None else f"{point.lam:g}"
             figures = format_interval(point.error, fine), format_interval(point.energy, small)
-            table.add_row(escape(point.policy), lam, *figures)
+            table.add_row(point.policy, lam, *figures)
         table.add_section()
     wide_console().print(table)
 
 
 def print_hypervolumes(volumes: list[Volume], reference: tuple[float, float]) -> None:
     """A row for every front: its hypervolume, its part of the reference point's box, the paired difference."""
-    from rich.markup import escape
     from rich.table import Table
 
     error, energy = reference
-    first = escape(volumes[0].front)
+    first = volumes[0].front
     table = Table(
         title="Hypervolume",
         caption=f"up to the reference point of {error:g} m and {energy:g} mJ; 95 % bootstrap intervals, paired",
@@ -68,7 +66,7 @@ def print_hypervolumes(volumes: list[Volume], reference: tuple[float, float]) ->
     for volume in volumes:
         difference = "" if volume.difference is None else format_interval(volume.difference, digits, "+")
         share = f"{100 * volume.hypervolume.mean / (error * energy):.1f} %"
-        table.add_row(escape(volume.front), format_interval(volume.hypervolume, digits), share, difference)
+        table.add_row(volume.front, format_interval(volume.hypervolume, digits), share, difference)
     wide_console().print(table)
 
 

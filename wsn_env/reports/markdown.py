@@ -13,10 +13,23 @@ from collections.abc import Iterable, Mapping, Sequence
 BLOCK = re.compile(r"(<!-- begin ([\w./-]+) -->\n).*?(<!-- end \2 -->)", flags=re.DOTALL)
 
 
+WORD = r"[^\W_]"  # where an underscore between two begins no emphasis
+SPECIAL = re.compile(rf"[\\`*\[\]<>~$&]|(?<!{WORD})_|_(?!{WORD})|:(?=[\w+-]+:)")
+
+
+def escape_markdown(text: str) -> str:
+    """A label as a page shows it: no emphasis, code, links, HTML, formulas or emoji. Tables see to its pipes."""
+    return SPECIAL.sub(r"\\\g<0>", text)
+
+
 def markdown_table(columns: Sequence[str], rows: Iterable[Sequence[str]], left: Sequence[int] = (0,)) -> str:
     """A table; these columns to the left, the others to the right."""
     marks = ["---" if i in left else "--:" for i in range(len(columns))]
-    return "".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |\n" for line in (columns, marks, *rows))
+    return "".join(f"| {' | '.join(_cell(cell) for cell in line)} |\n" for line in (columns, marks, *rows))
+
+
+def _cell(text: str) -> str:
+    return " ".join(text.splitlines()).replace("|", r"\|")
 
 
 def block_names(text: str) -> list[str]:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import base64
 import io
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -28,8 +31,16 @@ def escape_label(text: str) -> str:
 
 def write_picture(path: str | Path, figure: Figure, dpi: int = 140) -> None:
     """A figure as PNG, whole or not at all."""
-    with replacing(path) as temporary:
+    with replacing(path) as temporary, _missing_letters():
         figure.savefig(temporary, format="png", dpi=dpi)
+
+
+@contextmanager
+def _missing_letters() -> Iterator[None]:
+    """matplotlib draws a box for a letter that its font lacks, such as an emoji in a label: no warning for each."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        yield
 
 
 def svg_data_url(figure: Figure) -> str:
@@ -37,6 +48,6 @@ def svg_data_url(figure: Figure) -> str:
     from matplotlib import rc_context
 
     written = io.StringIO()
-    with rc_context({"svg.fonttype": "none", "svg.hashsalt": "wsn_env"}):
+    with rc_context({"svg.fonttype": "none", "svg.hashsalt": "wsn_env"}), _missing_letters():
         figure.savefig(written, format="svg", metadata={"Date": None})
     return "data:image/svg+xml;base64," + base64.b64encode(written.getvalue().encode()).decode()

@@ -7,7 +7,7 @@ from pathlib import Path
 from wsn_env.bluetooth.recorded_evaluation import RecordedEvaluation
 from wsn_env.evaluation.comparison import stem_of
 from wsn_env.evaluation.files import replacing
-from wsn_env.reports.markdown import markdown_table
+from wsn_env.reports.markdown import escape_markdown, markdown_table
 from wsn_env.reports.pictures import can_draw, write_picture
 from wsn_env.reports.recorded_plots import draw_recorded
 from wsn_env.reports.tables import wide_console
@@ -58,18 +58,17 @@ def compare_at_equal_energy(evaluation: RecordedEvaluation, lam: float) -> list[
 
 def print_recorded_tables(evaluation: RecordedEvaluation) -> None:
     """A table for each lam."""
-    from rich.markup import escape
     from rich.table import Table
 
     console = wide_console()
     for lam in evaluation.first.lams:
         header, rows = recorded_rows(evaluation, lam)
         title = f"{evaluation.first.scenario.name}, {evaluation.description}, lam = {lam:g} m/mJ"
-        drawn = Table(title=escape(title), caption=escape("\n".join(compare_at_equal_energy(evaluation, lam))))
+        drawn = Table(title=title, caption="\n".join(compare_at_equal_energy(evaluation, lam)))
         for name in header:
-            drawn.add_column(escape(name), justify="left" if name == "policy" else "right")
+            drawn.add_column(name, justify="left" if name == "policy" else "right")
         for row in rows:
-            drawn.add_row(*map(escape, row))
+            drawn.add_row(*row)
         console.print(drawn)
 
 
@@ -78,8 +77,10 @@ def recorded_markdown(evaluation: RecordedEvaluation) -> str:
     parts = list(evaluation.notes)
     for lam in evaluation.first.lams:
         header, rows = recorded_rows(evaluation, lam)
+        header[-len(evaluation.by_track) :] = map(escape_markdown, evaluation.by_track)
+        rows = [[escape_markdown(name), *figures] for name, *figures in rows]
         title = f"## {evaluation.description}, lam = {lam:g} m/mJ\n"
-        comparisons = (f"- {line}" for line in compare_at_equal_energy(evaluation, lam))
+        comparisons = (f"- {escape_markdown(line)}" for line in compare_at_equal_energy(evaluation, lam))
         parts.append("\n".join([title, markdown_table(header, rows), *comparisons]))
     return "\n\n".join(parts) + "\n"
 
@@ -90,7 +91,7 @@ def save_recorded(evaluation: RecordedEvaluation, out: str | Path) -> list[str]:
     out = Path(out)
     evaluation.save(out)
     with replacing(out / "tracks.md") as path:
-        path.write_text(recorded_markdown(evaluation))
+        path.write_text(recorded_markdown(evaluation), encoding="utf-8")
     names = ["tracks.csv", "tracks.json", "tracks.md"]
     if can_draw():
         names.append("tracks.png")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from wsn_env.evaluation.comparison import Evaluation
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.intervals import Summary
-from wsn_env.reports.markdown import markdown_table
+from wsn_env.reports.markdown import escape_markdown, markdown_table
 from wsn_env.simulation.reference import has_reference, why_no_reference
 
 if TYPE_CHECKING:
@@ -72,45 +72,48 @@ def describe_best_in_hindsight(evaluation: Evaluation, lam: float) -> list[str]:
 
 
 def wide_console() -> Console:
-    """For the terminal, or as wide as a table wants where the output is a file or a pipe."""
+    """For the terminal, or as wide as a table wants where the output is a file or a pipe.
+
+    It shows words as they are: a label may look like rich's markup, or hold the code of an emoji.
+    """
     from rich.console import Console
 
-    console = Console()
-    return console if console.is_terminal else Console(width=160)
+    console = Console(markup=False, emoji=False)
+    return console if console.is_terminal else Console(width=160, markup=False, emoji=False)
 
 
-def print_tables(evaluation: Evaluation, reference: str | None = None, console: Console | None = None) -> None:
+def print_tables(evaluation: Evaluation, reference: str | None = None) -> None:
     """One table for each lam."""
-    from rich.markup import escape
     from rich.table import Table
 
     reference = reference or evaluation.policies[0]
-    console = console or wide_console()
+    console = wide_console()
     for lam in evaluation.lams:
         title = f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes"
         caption = f"means, 95 % bootstrap intervals; {reference} - policy: paired difference of returns"
         lines = f"{caption}; {describe_reference(evaluation)}", *describe_best_in_hindsight(evaluation, lam)
-        table = Table(title=escape(title), caption=escape("\n".join(lines)))
+        table = Table(title=title, caption="\n".join(lines))
         for name in table_header(evaluation, reference):
-            table.add_column(escape(name), justify="left" if name == "policy" else "right")
+            table.add_column(name, justify="left" if name == "policy" else "right")
         for row in table_rows(evaluation, lam, reference):
-            table.add_row(*map(escape, row))
+            table.add_row(*row)
         console.print(table)
 
 
 def format_markdown(evaluation: Evaluation, lam: float, reference: str) -> str:
     """The same as Markdown."""
-    return markdown_table(table_header(evaluation, reference), table_rows(evaluation, lam, reference))
+    rows = [(escape_markdown(name), *figures) for name, *figures in table_rows(evaluation, lam, reference)]
+    return markdown_table(table_header(evaluation, escape_markdown(reference)), rows)
 
 
 def save_markdown(evaluation: Evaluation, folder: str | Path) -> None:
     """Write evaluation.md: a table for each lam, compared with the first policy."""
     parts = [
-        f"## {evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes\n\n"
+        f"## {escape_markdown(evaluation.scenario.name)}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes\n\n"
         + format_markdown(evaluation, lam, evaluation.policies[0])
         + f"\nMeans with 95 % bootstrap intervals; {describe_reference(evaluation)}.\n"
-        + "".join(f"\n{line}\n" for line in describe_best_in_hindsight(evaluation, lam))
+        + "".join(f"\n{escape_markdown(line)}\n" for line in describe_best_in_hindsight(evaluation, lam))
         for lam in evaluation.lams
     ]
     with replacing(Path(folder) / "evaluation.md") as path:
-        path.write_text("\n".join(parts))
+        path.write_text("\n".join(parts), encoding="utf-8")
