@@ -141,7 +141,7 @@ class Planner(ViewPolicy):
         """(B,) discounted costs of the choice and the rule after it [m]; the state's arrays are used up."""
         costs, weight = np.zeros(len(state.key)), 1.0
         for period in range(self.horizon):
-            cluster = choice if period == 0 else rule.act(View.of(state))
+            cluster = choice if period == 0 else rule.act(View(state.knowledge))
             state, outcome = self._world.step(state, cluster, donate=True)
             costs += weight * (belief_cost(outcome.row) + lam * outcome.energy_mj)
             weight *= self.discount

@@ -181,7 +181,7 @@ class Episode:
         action, observation = self.envs.interface.action, self.envs.interface.observation
         everywhere = np.ones(len(self.actions), bool)
         self.state, _ = self.world.restart(self.state, everywhere, self.record.keys, donate=True)
-        view = View.of(self.state)
+        view = View(self.state.knowledge)
         observation.encode(view)
         for _ in range(self.envs.scenario.periods):
             with timed["action"]:
@@ -189,7 +189,7 @@ class Episode:
             with timed["world"]:
                 self.state, _ = self.world.step(self.state, cluster, donate=True)
             with timed["observation"]:
-                view = View.of(self.state)
+                view = View(self.state.knowledge)
                 observation.encode(view)
 
     def _filter(self) -> list[np.ndarray]:

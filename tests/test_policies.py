@@ -141,9 +141,10 @@ def test_boundary_wakes_the_ring():
 
 def test_boundary_falls_back_on_the_nearest_node():
     scenario = Scenario.named("Binary-v0", particles=200, positions=((250, 250), (240, 250)), nodes=2)
-    view = View.of(World(scenario, threads=1).reset([1]))
-    view.belief["predicted_mean"][0] = [249, 0, 250, 0]
-    view.belief["predicted_cov"][0] = np.eye(4)
+    state = World(scenario, threads=1).reset([1])
+    state.belief.predicted_mean[0] = [249, 0, 250, 0]
+    state.belief.predicted_cov[0] = np.eye(4)
+    view = View.of(state)
     cluster = make_policy("boundary", scenario).act(view)
     assert chosen(cluster, 0) == {0}
 

@@ -86,6 +86,12 @@ class Arrays:
         """A deep copy: no array is shared."""
         return self.map(np.copy)
 
+    def freeze(self) -> Self:
+        """The same record, whose arrays can no longer be written to."""
+        for _, leaf in self.leaves():
+            leaf.flags.writeable = False
+        return self
+
     def leaves(self) -> list[tuple[str, np.ndarray]]:
         """(name, array) of all, such as ("network.battery", ...)."""
         return [(name, read(self)) for name, _, _, read in _leaves(type(self))]

@@ -12,7 +12,7 @@ from wsn_env.compiled.kernels import Pinned, kernel, lean_piece
 from wsn_env.envs.expectations import PLACES, REPORTS, Expectations, outlook_of
 from wsn_env.envs.merit import KEEP, NEAREST, ORDERS, RANKED, rank_row
 from wsn_env.models.measurement.base import Order
-from wsn_env.models.quantity import suggest
+from wsn_env.models.quantity import short, suggest, whole_number
 from wsn_env.models.state import KEEP_CLUSTER, Cluster, knowledge_at
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import common_constants
@@ -228,7 +228,7 @@ class ClusterAction:
 
 def _whole_numbers(action: Any, space: Any, rows: int) -> np.ndarray:
     """The actions as an array (rows, ...) of integers."""
-    array = np.asarray(action)
+    array = _as_array(action, space)
     if array.dtype.kind not in "iu" or array.shape != (rows, *space.shape):
         raise _refusal(action, space)
     return array
@@ -245,7 +245,7 @@ def _in_range(action: Any, space: Any, rows: int) -> np.ndarray:
 
 def _in_box(action: Any, space: Any, rows: int) -> np.ndarray:
     """The actions as an array (rows, ...), if they are in the space."""
-    array = np.asarray(action)
+    array = _as_array(action, space)
     if array.dtype.kind not in "fiu" or array.shape != (rows, *space.shape):
         raise _refusal(action, space)
     if not ((array >= space.low) & (array <= space.high)).all():  # NaN is not
@@ -253,8 +253,15 @@ def _in_box(action: Any, space: Any, rows: int) -> np.ndarray:
     return array
 
 
+def _as_array(action: Any, space: Any) -> np.ndarray:
+    try:
+        return np.asarray(action)
+    except ValueError:  # lists of unequal lengths
+        raise _refusal(action, space) from None
+
+
 def _refusal(action: Any, space: Any) -> ValueError:
-    return ValueError(f"action {action!r} is not in {space}, one for each row")
+    return ValueError(f"action {short(repr(action))} is not in {short(str(space))}, one for each row")
 
 
 ACTIONS: dict[str, Any] = {
@@ -277,6 +284,4 @@ def make_action(name: ActionName, scenario: Scenario, order: Order, candidates: 
         raise ValueError(f"action {name!r} is unknown: {suggest(name, ACTIONS)}")
     if order not in ORDERS:
         raise ValueError(f"order {order!r} is unknown: {suggest(order, ORDERS)}")
-    if not isinstance(candidates, int) or candidates < 1:
-        raise ValueError(f"candidates = {candidates!r}: must be a whole number, at least 1")
-    return ACTIONS[name](scenario, order, candidates)
+    return ACTIONS[name](scenario, order, whole_number("candidates", candidates, 1))

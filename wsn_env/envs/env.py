@@ -10,11 +10,12 @@ import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.envs.actions import ActionName
-from wsn_env.envs.interface import Interface, Settings
+from wsn_env.envs.interface import Interface, Settings, check_options, scenario_of
 from wsn_env.envs.observations import ObservationName
 from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera, RenderMode
 from wsn_env.envs.rewards import RewardName
 from wsn_env.models.measurement.base import Order
+from wsn_env.models.quantity import whole_number
 from wsn_env.models.state import OUTCOME, Outcome, State
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.quantities import Quantities
@@ -60,7 +61,7 @@ class ClusterEnv(gym.Env):
         fast: bool = False,
         **overrides: Unpack[Quantities],
     ) -> None:
-        self.scenario: Scenario = Scenario.of(scenario, **overrides)
+        self.scenario: Scenario = scenario_of(scenario, overrides, type(self))
         self._camera = None if render_mode is None else Camera(self.scenario, render_mode, frame_px)
         self.interface: Interface = Interface(self.scenario, Settings(action, observation, reward, order, candidates))
         self.world: World = World(self.scenario, threads=1, fast=fast)
@@ -71,7 +72,8 @@ class ClusterEnv(gym.Env):
             self.reward_space: gym.spaces.Box = self.interface.reward_space
             self.reward_dim: int = 2
         self._state: State = None  # type: ignore[assignment]  # until the first reset
-        self._view: View = None  # type: ignore[assignment]
+        self._view: View = None  # type: ignore[assignment]  # shares the state's arrays
+        self._shown: View | None = None  # the period's for others, once they have asked
         self._lam, self._period, self._ended = 0.0, 0, False
         self._squares = 0.0
         self._detections = 0
@@ -79,7 +81,8 @@ class ClusterEnv(gym.Env):
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """A new episode: seed fixes field, track and every draw."""
-        super().reset(seed=seed)
+        check_options(options)
+        super().reset(seed=None if seed is None else whole_number("seed", seed, 0))
         state = self.world.allocate(1) if self._state is None else self._state
         key = draws.episode_key(self.np_random)
         self._state, outcome = self.world.restart(state, [True], np.array([key]), donate=True)
@@ -132,13 +135,17 @@ class ClusterEnv(gym.Env):
     @property
     def view(self) -> View:
         """What hand-written policies see now: `policy.act(env.view)` is their choice, whatever the action space."""
-        if self._view is None:
+        if self._state is None:
             raise gym.error.ResetNeeded("call reset() first")
-        return self._view
+        if self._shown is None:
+            self._shown = View.of(self._state)
+        return self._shown
 
     def action_masks(self) -> np.ndarray:
         """Which entries of the action make sense now (flat bool, as sb3-contrib's MaskablePPO wants them)."""
-        return self.interface.action.masks(self.view)[0]
+        if self._state is None:
+            raise gym.error.ResetNeeded("call reset() first")
+        return self.interface.action.masks(self._view)[0]
 
     def render(self) -> Any:
         """A frame (frame_px, frame_px, 3) uint8 of the present state; in "human" mode None: reset and step show it."""
@@ -153,7 +160,7 @@ class ClusterEnv(gym.Env):
             self._camera.close()
 
     def _observe(self) -> Any:
-        self._view = View.of(self._state)
+        self._view, self._shown = View(self._state.knowledge), None
         arrays = self.interface.observation.encode(self._view)
         if isinstance(arrays, dict):
             return {name: value[0] if value.ndim > 1 else value.item() for name, value in arrays.items()}
@@ -161,4 +168,9 @@ class ClusterEnv(gym.Env):
 
 
 def _add_batch_axis(action: Any) -> Any:
-    return {k: np.asarray(v)[None] for k, v in action.items()} if isinstance(action, dict) else np.asarray(action)[None]
+    try:
+        if isinstance(action, dict):
+            return {name: np.asarray(value)[None] for name, value in action.items()}
+        return np.asarray(action)[None]
+    except ValueError:  # lists of unequal lengths
+        return [action]  # which no space contains

@@ -1,6 +1,8 @@
 """What learners meet: actions (spaces <-> Cluster), observations (View -> arrays), rewards, pictures."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from inspect import signature
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,7 @@ from wsn_env.envs.info import period_info
 from wsn_env.envs.observations import Observation, ObservationName, make_observation
 from wsn_env.envs.rewards import RewardName, make_reward, reward_space
 from wsn_env.models.measurement.base import Order
+from wsn_env.models.quantity import UnknownQuantity, short
 from wsn_env.scenario import Scenario
 
 
@@ -23,6 +26,27 @@ class Settings:
     reward: RewardName = "error"
     order: Order = "nearest"
     candidates: int = 12
+
+
+def scenario_of(scenario: str | Scenario, overrides: Any, environment: Callable[..., Any]) -> Scenario:
+    """The scenario of an environment that was given these keywords beside its own.
+
+    Raises:
+        ScenarioError: for an unknown keyword, suggests among the quantities and the environment's own arguments.
+    """
+    try:
+        return Scenario.of(scenario, **overrides)
+    except UnknownQuantity as problem:
+        own = [
+            each.name for each in signature(environment).parameters.values() if each.kind is each.POSITIONAL_OR_KEYWORD
+        ]
+        raise UnknownQuantity(problem.owner, problem.name, [*problem.known, *own]) from None
+
+
+def check_options(options: Any) -> None:
+    """Raise ValueError unless reset's options are a dict or None."""
+    if options is not None and not isinstance(options, Mapping):
+        raise ValueError(f"options = {short(repr(options))}: must be a dict or None")
 
 
 class Interface:

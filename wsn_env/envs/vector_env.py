@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Literal, Unpack, cast
 
 import gymnasium as gym
@@ -12,11 +13,12 @@ from gymnasium.vector.utils import batch_space
 
 from wsn_env.compiled import draws
 from wsn_env.envs.actions import ActionName
-from wsn_env.envs.interface import Interface, Settings
+from wsn_env.envs.interface import Interface, Settings, check_options, scenario_of
 from wsn_env.envs.observations import ObservationName
 from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera, RenderMode
 from wsn_env.envs.rewards import RewardName
 from wsn_env.models.measurement.base import Order
+from wsn_env.models.quantity import whole_number
 from wsn_env.models.state import State
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.quantities import Quantities
@@ -58,31 +60,30 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         threads: int | None = None,
         **overrides: Unpack[Quantities],
     ) -> None:
-        if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
-            raise ValueError(f"num_envs = {num_envs!r}: must be a whole number, at least 1")
-        self.num_envs: int = int(num_envs)
+        self.num_envs: int = whole_number("num_envs", num_envs, 1)
         self.autoreset_mode: AutoresetMode = AutoresetMode(autoreset_mode)
         self.metadata = type(self).metadata | {"autoreset_mode": self.autoreset_mode}
         self.render_mode: RenderMode | None = render_mode
-        self.scenario: Scenario = Scenario.of(scenario, **overrides)
+        self.scenario: Scenario = scenario_of(scenario, overrides, type(self))
         self._camera = None if render_mode is None else Camera(self.scenario, render_mode, frame_px)
         self.world: World = World(self.scenario, threads, fast)
         settings = Settings(action, observation, reward, order, candidates)
         self.interface: Interface = Interface(self.scenario, settings, self.world.threads)
         self.single_action_space: gym.Space[Any] = self.interface.action.space
         self.single_observation_space: gym.Space[Any] = self.interface.observation.space
-        self.action_space: gym.Space[Any] = batch_space(self.single_action_space, num_envs)
-        self.observation_space: gym.Space[Any] = batch_space(self.single_observation_space, num_envs)
+        self.action_space: gym.Space[Any] = batch_space(self.single_action_space, self.num_envs)
+        self.observation_space: gym.Space[Any] = batch_space(self.single_observation_space, self.num_envs)
         if self.interface.reward_space is not None:
             self.reward_space: gym.spaces.Box = self.interface.reward_space
             self.reward_dim: int = 2
-        self._generators: list[np.random.Generator | None] = [None] * num_envs
+        self._generators: list[np.random.Generator | None] = [None] * self.num_envs
         self._state: State = None  # type: ignore[assignment]  # until the first reset
-        self._view: View = None  # type: ignore[assignment]
+        self._view: View = None  # type: ignore[assignment]  # shares the state's arrays
+        self._shown: View | None = None  # the period's for others, once they have asked
         self._last: Any = None  # observation
-        self._squares = np.zeros(num_envs)
-        self._detections = np.zeros(num_envs, dtype=np.int64)
-        self._ended = np.zeros(num_envs, dtype=bool)
+        self._squares = np.zeros(self.num_envs)
+        self._detections = np.zeros(self.num_envs, dtype=np.int64)
+        self._ended = np.zeros(self.num_envs, dtype=bool)
         self._reference = None
         if has_reference(self.scenario):
             self._reference = Reference(self.scenario, self.num_envs, self.world.threads)
@@ -95,13 +96,8 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         Args:
             seed: an int seeds row i with seed + i; a list seeds each row, None leaves its generator going.
         """
-        rows = self._rows_to_reset(options)
-        if seed is None or isinstance(seed, int):
-            seeds = [None if seed is None else seed + i for i in range(self.num_envs)]
-        else:
-            seeds = list(seed)
-        if len(seeds) != self.num_envs:
-            raise ValueError(f"seed has {len(seeds)} entries: must have one for each of the {self.num_envs} rows")
+        check_options(options)
+        rows, seeds = self._rows_to_reset(options), row_seeds(seed, self.num_envs)
         for i in np.flatnonzero(rows):
             if seeds[i] is not None or self._generators[i] is None:
                 self._generators[i] = seeding.np_random(seeds[i])[0]
@@ -224,13 +220,17 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
     @property
     def view(self) -> View:
         """What hand-written policies see now, all rows: `policy.act(envs.view)` is their choice."""
-        if self._view is None:
+        if self._state is None:
             raise gym.error.ResetNeeded("call reset() first")
-        return self._view
+        if self._shown is None:
+            self._shown = View.of(self._state)
+        return self._shown
 
     def action_masks(self) -> np.ndarray:
         """(B, n) bool: which entries of each row's action make sense now."""
-        return self.interface.action.masks(self.view)
+        if self._state is None:
+            raise gym.error.ResetNeeded("call reset() first")
+        return self.interface.action.masks(self._view)
 
     def render(self) -> Any:
         """A tuple of B frames (frame_px, frame_px, 3) uint8; in "human" mode None: reset and step show one window."""
@@ -250,7 +250,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
 
     def _observe(self, rows: np.ndarray | None = None) -> Any:
         """The observation of all rows, of which only `rows` have changed since the last."""
-        before, self._view = self._view, View.of(self._state)
+        before, self._view, self._shown = self._view, View(self._state.knowledge), None
         if rows is None or before is None or rows.all():
             observation = self.interface.observation.encode(self._view)
         else:
@@ -259,10 +259,24 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         return observation
 
 
+def row_seeds(seed: Any, rows: int) -> list[int | None]:
+    """A seed for each row: seed + i, or those of a sequence; None leaves a row's generator going."""
+    if seed is None:
+        return [None] * rows
+    if not isinstance(seed, (Sequence, np.ndarray)) or isinstance(seed, str) or np.ndim(seed) == 0:
+        first = whole_number("seed", seed, 0)
+        return [first + i for i in range(rows)]
+    if len(seed) != rows:
+        raise ValueError(f"seed has {len(seed)} entries: must have one for each of the {rows} rows")
+    return [None if each is None else whole_number("seed", each, 0) for each in seed]
+
+
 def _stack_actions(actions: Any) -> Any:
     """A dict of arrays from a list of dicts, as policies' predict() gives them; anything else as it is."""
-    if isinstance(actions, (list, tuple, np.ndarray)) and len(actions) and isinstance(actions[0], dict):
-        return {name: np.stack([one[name] for one in actions]) for name in actions[0]}
+    several = isinstance(actions, (list, tuple)) or (isinstance(actions, np.ndarray) and actions.ndim)
+    if several and len(actions) and isinstance(actions[0], dict):
+        if all(isinstance(one, dict) and one.keys() == actions[0].keys() for one in actions):
+            return {name: np.stack([one[name] for one in actions]) for name in actions[0]}
     return actions
 
 

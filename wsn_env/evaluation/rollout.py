@@ -9,7 +9,8 @@ import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.evaluation.policies import Policy
-from wsn_env.models.state import Cluster, Outcome, State
+from wsn_env.models.quantity import whole_number
+from wsn_env.models.state import NOBODY, Cluster, Outcome, State
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.reference import Reference, has_reference
 from wsn_env.simulation.view import View
@@ -21,10 +22,7 @@ FIRST_SEED, SEEDS_PER_RUN = 2**31, 10**5  # training seeds lie below FIRST_SEED
 
 def evaluation_seeds(seed: int, episodes: int) -> list[int]:
     """The literal reset seeds of an evaluation; `gym.make(...).reset(seed=s)` replays episode s."""
-    if not 0 <= seed < 10**4:
-        raise ValueError(f"seed = {seed}: must be in 0..9999")
-    if not 1 <= episodes <= SEEDS_PER_RUN:
-        raise ValueError(f"episodes = {episodes}: must be in 1..{SEEDS_PER_RUN}")
+    seed, episodes = whole_number("seed", seed, 0, 10**4 - 1), whole_number("episodes", episodes, 1, SEEDS_PER_RUN)
     return [FIRST_SEED + seed * SEEDS_PER_RUN + episode for episode in range(episodes)]
 
 
@@ -40,20 +38,26 @@ def episodes(
     if begin is not None:
         begin(state, outcome)
     for _ in range(world.scenario.periods):
-        cluster = _check_cluster(policy.act(View.of(state)), policy, world.scenario.field.nodes)
+        cluster = _check_cluster(policy.act(View.of(state)), policy, state.rows, world.scenario.field.nodes)
         state, outcome = world.step(state, cluster, donate=True)
         yield state, outcome
 
 
-def _check_cluster(cluster: Cluster, policy: Policy, nodes: int) -> Cluster:
+def _check_cluster(cluster: Cluster, policy: Policy, rows: int, nodes: int) -> Cluster:
     """What a policy chose; the world would drop and count nodes that do not exist, here they are a mistake."""
     if not isinstance(cluster, Cluster):
         chose = type(cluster).__name__
         raise ValueError(f"{type(policy).__name__}.act: returned a {chose}: must be a Cluster(head, members)")
-    highest = max(np.max(cluster.head), np.max(cluster.members, initial=-1))
-    if highest >= nodes:
-        raise ValueError(f"{type(policy).__name__}.act: chose node {highest}: must be below {nodes}")
-    return cluster
+    try:
+        heads, members = cluster.check(rows)
+    except ValueError as problem:
+        raise ValueError(f"{type(policy).__name__}.act: {problem}") from None
+    for chosen, lowest in ((heads, NOBODY), (members, -1)):
+        least, highest = int(chosen.min(initial=0)), int(chosen.max(initial=0))
+        if least < lowest or highest >= nodes:
+            wrong = least if least < lowest else highest
+            raise ValueError(f"{type(policy).__name__}.act: chose node {wrong}: must be below {nodes}, and at least 0")
+    return Cluster(heads, members)
 
 
 def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str, Any]]:

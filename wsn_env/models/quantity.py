@@ -7,14 +7,27 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
 from typing import Any
+from unicodedata import category
 
 import numpy as np
 
+NO_TEXT = ("Cc", "Cs", "Zl", "Zp")  # Unicode's control characters, lone surrogates, separators of lines, paragraphs
 NUMBERS: Any = (int, float, np.integer, np.floating)
 
 
 class ScenarioError(ValueError):
     """A quantity is not what it may be; the message names it, its value and what is allowed."""
+
+
+class UnknownQuantity(ScenarioError):
+    """There is no quantity of this name."""
+
+    def __init__(self, owner: str, name: str, known: Iterable[str]) -> None:
+        super().__init__(f"{owner} has no quantity {name!r}: {suggest(name, known)}")
+        self.owner, self.name, self.known = owner, name, tuple(known)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return UnknownQuantity, (self.owner, self.name, self.known)
 
 
 def quantity(default: Any, meaning: str, **allowed: Any) -> Any:
@@ -66,17 +79,49 @@ def check_quantity(  # noqa: PLR0913
         raise ScenarioError(f"{owner}.{name} = {value!r:.80}: must be {kind} {rules}".rstrip())
 
 
+def whole_number(name: str, value: Any, least: int, most: int | None = None) -> int:
+    """Python's int of an argument that may be NumPy's.
+
+    Raises:
+        ValueError: unless it is a whole number in least..most; the message names the argument.
+    """
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not whole or value < least or (most is not None and value > most):
+        rule = f"a whole number, at least {least}" if most is None else f"in {least}..{most}, a whole number"
+        raise ValueError(f"{name} = {short(repr(value))}: must be {rule}")
+    return int(value)
+
+
+def plain(value: Any) -> Any:
+    """Python's own number for one of NumPy, in tuples and lists too; anything else as it is."""
+    if isinstance(value, np.generic):
+        return value.item()
+    return type(value)(map(plain, value)) if type(value) in (tuple, list) else value
+
+
 @dataclass(frozen=True)
 class Section:
     """Base of all sections: checks every quantity when it is made."""
 
     def __post_init__(self) -> None:
         for item in fields(self):
+            object.__setattr__(self, item.name, plain(getattr(self, item.name)))
             if "allowed" in item.metadata:
                 value, allowed = getattr(self, item.name), item.metadata["allowed"]
                 check_quantity(type(self).__name__, item.name, value, **allowed)
                 if allowed.get("whole") and value is not None:
                     object.__setattr__(self, item.name, int(value))
+
+
+def short(text: str, most: int = 80) -> str:
+    """A text for a message: on one line, cut where it is long."""
+    text = " ".join(text.split())
+    return text if len(text) <= most else f"{text[: most - 4]} ..."
+
+
+def is_line(text: Any) -> bool:
+    """Whether it is one line of text, as tables, pages, pictures and files can show it: no control characters."""
+    return isinstance(text, str) and text.strip() != "" and not any(category(letter) in NO_TEXT for letter in text)
 
 
 def suggest(name: str, known: Iterable[object]) -> str:

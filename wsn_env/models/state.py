@@ -17,6 +17,7 @@ import numpy.typing as npt
 from wsn_env.compiled.arrays import Arrays, array, opener, part, record
 from wsn_env.compiled.kernels import inline_piece
 from wsn_env.models.measurement.beacon_levels import RECEIVER
+from wsn_env.models.quantity import short
 
 BELIEF = record(
     [
@@ -192,13 +193,54 @@ class Cluster(NamedTuple):
             head: (B,) node.
             chosen: (B, S) bool, the members.
         """
-        chosen = np.asarray(chosen, dtype=bool)
+        chosen = np.asarray(chosen)
+        if chosen.ndim != 2 or (chosen.dtype != bool and not np.isin(chosen, (0, 1)).all()):
+            raise ValueError(
+                f"Cluster.of: chosen = {short(repr(chosen))}: must be a mask (B, S) of bool, not node numbers"
+            )
+        chosen = chosen.astype(bool)
         width = int(chosen.sum(axis=1).max(initial=0))
         members = np.full((len(chosen), width), -1, dtype=np.int32)
         rows, nodes = np.nonzero(chosen)
         slots = np.cumsum(chosen, axis=1)[rows, nodes] - 1
         members[rows, slots] = nodes
-        return cls(np.asarray(head, dtype=np.int64), members)
+        return cls(whole_nodes("head", head).astype(np.int64, copy=False), members)
+
+    def check(self, rows: int) -> tuple[np.ndarray, np.ndarray]:
+        """Head and members as arrays of integers.
+
+        Args:
+            rows: B.
+
+        Raises:
+            ValueError: what is no whole number, or not one row for each environment.
+        """
+        head, members = whole_nodes("head", self.head), whole_nodes("members", self.members)
+        if head.shape != (rows,) or members.ndim != 2 or len(members) != rows:
+            raise ValueError(
+                f"cluster has head {head.shape}, members {members.shape}: must be ({rows},), ({rows}, M), a row for"
+                " each environment"
+            )
+        return head, members
+
+
+def whole_nodes(name: str, values: Any) -> np.ndarray:
+    """Node numbers as an array of integers of any width; floats must be whole.
+
+    Raises:
+        ValueError: for anything else: fractions, NaN, masks, words, lists of unequal lengths.
+    """
+    if type(values) is np.ndarray and values.dtype.kind in "iu":
+        return values
+    try:
+        array = np.asarray(values)
+    except ValueError:  # unequal lengths
+        array = np.empty(0, object)
+    if array.dtype.kind in "iu":
+        return array
+    if array.dtype.kind == "f" and (np.abs(array) < 2**53).all() and (array == np.trunc(array)).all():
+        return array.astype(np.int64)
+    raise ValueError(f"cluster.{name} = {short(repr(values))}: must be whole node numbers, an array of integers")
 
 
 PURPOSES = ("sensing", "handover", "invitation", "report", "broadcast", "search")

@@ -1,7 +1,7 @@
 """What policies and observations may see: belief, delivered reports, batteries, geometry, the standing cluster.
 
-Nothing here depends on the truth but through reports. A view shares its arrays with the state it was made from and is
-valid until that state is stepped with donate=True.
+Nothing here depends on the truth but through reports. The arrays of a view are read-only, and those of `View.of` belong
+to their period: whatever a policy does with them, and however long it keeps them, neither they nor the world change.
 """
 
 from __future__ import annotations
@@ -20,7 +20,11 @@ HEARING = ("latest_db", "gradient", "variance")  # of a beacon's receivers, what
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """The network's knowledge before it chooses the cluster of the next period; all arrays lead with B."""
+    """The network's knowledge before it chooses the cluster of the next period; all arrays lead with B, and are
+    read-only.
+
+    `View(state.knowledge)` shares its arrays with the state, for code that neither writes to nor keeps them.
+    """
 
     knowledge: Knowledge
     derived: dict[Any, Any] = field(default_factory=dict, repr=False)  # what has been found out from it, kept
@@ -92,8 +96,8 @@ class View:
 
     @classmethod
     def of(cls, state: State) -> View:
-        """The view of a state."""
-        return cls(state.knowledge)
+        """The view of a state, with arrays of its own: it stays what it is when the state is stepped."""
+        return cls(state.knowledge.copy().freeze())
 
     @property
     def positions(self) -> np.ndarray:
@@ -118,7 +122,7 @@ class View:
     @cached_property
     def alive(self) -> np.ndarray:
         """(B, S) bool."""
-        return self.battery > 0
+        return _frozen(self.battery > 0)
 
     @cached_property
     def member(self) -> np.ndarray:
@@ -126,12 +130,12 @@ class View:
         mask = _mask(self.network.members, self.network.n_members)
         rows = np.flatnonzero(self.head >= 0)
         mask[rows, self.head[rows]] = True
-        return mask
+        return _frozen(mask)
 
     @cached_property
     def detected(self) -> np.ndarray:
         """(B, S) bool: whose reports the head had in the last period, its own included."""
-        return _mask(self.reports.node, self.reports.count)
+        return _frozen(_mask(self.reports.node, self.reports.count))
 
     @cached_property
     def sees(self) -> np.ndarray:
@@ -139,7 +143,7 @@ class View:
         or asked in a search, and whose state is 1."""
         if not self.reports.bitmap.shape[1]:
             return self.detected
-        return (self.reports.bitmap > 0) & (self.member | self.detected)
+        return _frozen((self.reports.bitmap > 0) & (self.member | self.detected))
 
     @cached_property
     def measured(self) -> np.ndarray:
@@ -147,7 +151,7 @@ class View:
         values = np.zeros(self.positions.shape)
         rows, slots = np.nonzero(np.arange(self.reports.node.shape[1]) < self.reports.count[:, None])
         values[rows, self.reports.node[rows, slots]] = self.reports.value[rows, slots]
-        return values
+        return _frozen(values)
 
     @property
     def prediction(self) -> np.ndarray:
@@ -162,14 +166,14 @@ class View:
     @cached_property
     def distance(self) -> np.ndarray:
         """(B, S) of the nodes to the prediction [m]."""
-        return geometry.distances_to(self.positions, self.prediction)
+        return _frozen(geometry.distances_to(self.positions, self.prediction))
 
     def nearest(self, count: int, ring_m: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """The living nodes nearest to the prediction, or to a ring about it: (B, count) nodes, -1 for none, and their
         distances to the prediction [m]."""
         key = "nearest", count, ring_m
         if key not in self.derived:
-            self.derived[key] = geometry.nearest(self.network, self.prediction, count, ring_m)
+            self.derived[key] = tuple(map(_frozen, geometry.nearest(self.network, self.prediction, count, ring_m)))
         return self.derived[key]
 
     def nearest_living(self) -> np.ndarray:
@@ -229,7 +233,13 @@ class View:
         reports.value[:] = np.take_along_axis(a["measured"], np.maximum(slots, 0), axis=1)
         if "bitmap" in a:
             reports.bitmap[:] = a["bitmap"]
-        return cls(known)
+        return cls(known.freeze())
+
+
+def _frozen(array: np.ndarray) -> np.ndarray:
+    """What is kept with a view, for all who ask."""
+    array.flags.writeable = False
+    return array
 
 
 def _mask(nodes: np.ndarray, count: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from wsn_env.compiled import kernels
 from wsn_env.compiled.kernels import available_threads, over_rows, threads_for
 from wsn_env.filters import make_tracker
 from wsn_env.filters.particle import ParticleTracker
+from wsn_env.models.quantity import whole_number
 from wsn_env.models.state import OUTCOME, Cluster, Grid, Outcome, State, Tracker
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import constants
@@ -22,18 +23,18 @@ LONG_LIST = 64
 class World:
     """A scenario brought to life. Holds no state of its own: every method is a function of its arguments."""
 
-    def __init__(self, scenario: Scenario, threads: int | None = None, fast: bool = False) -> None:
+    def __init__(self, scenario: Scenario | str, threads: int | None = None, fast: bool = False) -> None:
         """Prepare a scenario.
 
         Args:
-            scenario: what to simulate.
+            scenario: what to simulate, or a preset's name.
             threads: at most so many share a large batch; None: every core that the process may use. The bits of
                 a result do not depend on it.
             fast: let the compiler regroup the particle filter's sums: quicker, equal to rounding, but with other bits
                 on other processors. The world itself stays as it is.
         """
-        self.scenario: Scenario = scenario
-        self.threads: int = threads or available_threads()
+        self.scenario: Scenario = (scenario := Scenario.of(scenario))
+        self.threads: int = available_threads() if threads is None else whole_number("threads", threads, 1)
         self.tracker: Tracker = make_tracker(scenario, self.threads, fast)
         self._run = kernels.Pinned(kernels.fast(period.run) if fast else period.run)
         self._constants = constants(scenario)
@@ -148,14 +149,14 @@ def _nothing_yet(state: State) -> Outcome:
 
 def _choice(cluster: Cluster, state: State) -> tuple[np.ndarray, np.ndarray]:
     """Heads (B,) and members (B, M) as kernels take them."""
-    heads, members = np.ascontiguousarray(cluster.head, np.int64), np.asarray(cluster.members)
-    if heads.shape != (state.rows,) or members.ndim != 2 or len(members) != state.rows:
-        raise ValueError(
-            f"cluster has head {heads.shape}, members {members.shape}: must be ({state.rows},), ({state.rows}, M)"
-        )
-    if members.dtype != np.int32:  # numbers that 32 bits would wrap are no nodes
-        nodes = state.network.battery.shape[1]
+    heads, members = cluster.check(state.rows)
+    nodes = state.network.battery.shape[1]
+    if heads.dtype.kind == "u":  # numbers that 63 bits would wrap are no nodes
+        heads = np.minimum(heads.astype(np.uint64), np.uint64(nodes))
+    if members.dtype != np.int32:  # nor those that 32 bits would
         members = np.where((members < -1) | (members > nodes), nodes, members)
     if members.shape[1] > LONG_LIST:  # kernels sort short lists
         members = np.sort(members, axis=1)
-    return heads, np.ascontiguousarray(members, np.int32)
+    heads, members = np.ascontiguousarray(heads, np.int64), np.ascontiguousarray(members, np.int32)
+    # Kernels are compiled for arrays that may be written to.
+    return heads if heads.flags.writeable else heads.copy(), members if members.flags.writeable else members.copy()

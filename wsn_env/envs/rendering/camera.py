@@ -13,6 +13,7 @@ import numpy.typing as npt
 from wsn_env.envs.rendering.frame import frame
 from wsn_env.envs.rendering.plan import SIZE, SMALLEST
 from wsn_env.envs.rendering.trail import Trail
+from wsn_env.models.quantity import whole_number
 from wsn_env.models.state import Outcome, State
 from wsn_env.scenario import Scenario
 
@@ -40,10 +41,8 @@ class Camera:
     ) -> None:
         if render_mode not in RENDER_MODES:
             raise ValueError(f"render_mode = {render_mode!r}: allowed are None, {', '.join(RENDER_MODES)}")
-        if isinstance(frame_px, bool) or not isinstance(frame_px, (int, np.integer)) or frame_px < SMALLEST:
-            raise ValueError(f"frame_px = {frame_px!r}: must be a whole number of pixels, at least {SMALLEST}")
         self.scenario: Scenario = scenario
-        self.frame_px: int = int(frame_px)
+        self.frame_px: int = whole_number("frame_px", frame_px, SMALLEST)
         self._trail: Trail = None  # type: ignore[assignment]  # until episodes have begun
         self._window = Window(f"wsn_env {scenario.name}", fps) if render_mode == "human" else None
 

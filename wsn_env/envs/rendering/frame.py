@@ -80,7 +80,7 @@ def frame(state: State, scenario: Scenario, trail: Trail, row: int = 0, size: in
     _write_head(canvas, plan, scene)
     if scene.last["searched"]:
         _flash(canvas, plan)
-    view = View.of(state.only(row))
+    view = View(state.only(row).knowledge)
     awake, sees = np.flatnonzero(view.member[0]), np.flatnonzero(view.sees[0])
     if len(awake) and shows_radius(scenario):
         canvas.clip = plan.field

@@ -131,5 +131,7 @@ def _frame(state: State, outcome: Outcome, scenario: Scenario) -> dict[str, obje
         "handover": bool(outcome.handover[0]),
     }
     return frame | (
-        {"detects": np.flatnonzero(View.of(state).sees[0]).tolist()} if scenario.measurement.reports_state else {}
+        {"detects": np.flatnonzero(View(state.knowledge).sees[0]).tolist()}
+        if scenario.measurement.reports_state
+        else {}
     )
