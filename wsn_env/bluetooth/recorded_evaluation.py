@@ -140,9 +140,10 @@ def evaluate_recorded(  # noqa: PLR0913
     return RecordedEvaluation(evaluations, tuple(track.note for track in tracks if track.note))
 
 
-def insert_track_name(policies: Sequence[str], track: str) -> list[str]:
+def insert_track_name(policies: str | Sequence[str], track: str) -> list[str]:
     """Names of policies, with the track's for {track}."""
-    return [policy.replace("{track}", track) for policy in policies]
+    policies = [policies] if isinstance(policies, str) else policies
+    return [policy.replace("{track}", track) if isinstance(policy, str) else policy for policy in policies]
 
 
 def replay_scenario(scenario: Scenario, path: str | Path, calibrated: bool = False) -> Scenario:

@@ -8,7 +8,7 @@ import numpy as np
 
 from wsn_env.evaluation import rollout
 from wsn_env.evaluation.intervals import Measured
-from wsn_env.evaluation.policies import Policy, make_policy
+from wsn_env.evaluation.policies import Policy, named_policies
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.bound import Bound
 from wsn_env.simulation.world import World
@@ -23,7 +23,7 @@ class BoundedError(NamedTuple):
     bound_stderr_m: float  # the bound's expectations are means over the episodes, too; NaN with fewer than 100
 
 
-def error_bound(policy: Policy | str, scenario: Scenario, episodes: int = 1000, seed: int = 0) -> BoundedError:
+def error_bound(policy: Policy | str, scenario: Scenario | str, episodes: int = 1000, seed: int = 0) -> BoundedError:
     """Play a policy and bound the error of any tracker with its reports (`simulation/bound.py`).
 
     Args:
@@ -35,10 +35,11 @@ def error_bound(policy: Policy | str, scenario: Scenario, episodes: int = 1000, 
     Raises:
         ValueError: where the scenario has no bound, or a node dies.
     """
-    policy = make_policy(policy, scenario) if isinstance(policy, str) else policy
+    scenario = Scenario.of(scenario)
+    (policy,) = named_policies(policy if isinstance(policy, str) else {"policy": policy}, scenario).values()
     world, seeds = World(scenario), rollout.evaluation_seeds(seed, episodes)
     bound, squares = Bound(scenario, world.threads), []
-    for first in range(0, episodes, rollout.BLOCK):
+    for first in range(0, len(seeds), rollout.BLOCK):
         block = seeds[first : first + rollout.BLOCK]
         square = np.zeros(len(block))
         for state, outcome in rollout.episodes(policy, world, block, lambda state, _: bound.begin(state)):

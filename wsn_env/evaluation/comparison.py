@@ -26,7 +26,7 @@ from wsn_env.evaluation.policies import Policy, named_policies
 from wsn_env.evaluation.progress import Progress
 from wsn_env.evaluation.rollout import BLOCK, Block, Engine, change_lam, evaluation_seeds, in_this_process
 from wsn_env.evaluation.versions import versions
-from wsn_env.models.quantity import suggest
+from wsn_env.models.quantity import NUMBERS, short, suggest
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.reference import has_reference
 
@@ -153,9 +153,9 @@ def stem_of(policy: str) -> str:
 
 
 def evaluate(  # noqa: PLR0913
-    policies: Sequence[str] | dict[str, Policy],
-    scenario: Scenario,
-    lams: Sequence[float] | None = None,
+    policies: str | Sequence[str] | dict[str, Policy],
+    scenario: Scenario | str,
+    lams: float | Sequence[float] | None = None,
     episodes: int = 100,
     seed: int = 0,
     keep: str | Path | None = None,
@@ -168,8 +168,8 @@ def evaluate(  # noqa: PLR0913
     Args:
         policies: as for `named_policies`, or name -> Policy. The first is the reference of differences. One
             with `sees_lam = False` plays once for all lams.
-        scenario: what they act in.
-        lams: the trade-offs [m/mJ]; None: the scenario's, which must then be a single one.
+        scenario: what they act in, or a preset's name.
+        lams: the trade-offs [m/mJ], or one of them; None: the scenario's, which must then be a single one.
         episodes: common random episodes for each policy and lam.
         seed: another seed, other episodes; training never meets any of them.
         keep: a folder for finished blocks, so that a stopped run continues; None: none are kept. Of an object without
@@ -181,15 +181,10 @@ def evaluate(  # noqa: PLR0913
     Raises:
         ValueError: for an unknown policy, seed and episodes out of range, or another run that keeps blocks there.
     """
-    if lams is None:
-        if isinstance(scenario.lam, (tuple, list)):
-            raise ValueError(f"scenario.lam = {scenario.lam}: name the lams to compare at, one number each")
-        lams = [scenario.lam]
-    lams = tuple(dict.fromkeys(map(float, lams)))
-    if not policies or not lams:
-        raise ValueError("policies and lams must name at least one each")
-    named = policies if isinstance(policies, dict) else named_policies(policies, scenario)
+    scenario = Scenario.of(scenario)
     seeds = evaluation_seeds(seed, episodes)
+    seed, episodes, lams = int(seed), len(seeds), _trade_offs(lams, scenario)
+    named = named_policies(policies, scenario)
     blocks: dict[tuple[str, float | None, int], Block] = {}
     for lam in lams:
         at_this = scenario.override(lam=lam)
@@ -220,6 +215,19 @@ def evaluate(  # noqa: PLR0913
                 } | values
                 rows.append({column: row[column] for column in COLUMNS})
     return Evaluation(scenario, tuple(named), lams, episodes, seed, rows)
+
+
+def _trade_offs(lams: Any, scenario: Scenario) -> tuple[float, ...]:
+    """The lams to compare at, each once."""
+    if lams is None:
+        if isinstance(scenario.lam, (tuple, list)):
+            raise ValueError(f"scenario.lam = {scenario.lam}: name the lams to compare at, one number each")
+        lams = scenario.lam
+    lams = lams.tolist() if isinstance(lams, np.ndarray) else lams
+    each = list(lams) if np.iterable(lams) and not isinstance(lams, str) else [lams]
+    if not each or any(not isinstance(lam, NUMBERS) or isinstance(lam, bool) for lam in each):
+        raise ValueError(f"lams = {short(repr(lams))}: must be a number of m/mJ, or at least one in a list")
+    return tuple(dict.fromkeys(map(float, each)))
 
 
 def _settings(

@@ -7,13 +7,14 @@ an object with `act(view) -> Cluster`.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping
 from importlib.metadata import EntryPoint, entry_points
+from inspect import signature
 from pathlib import Path
 from typing import Any, Protocol
 
 from wsn_env.models.own import class_in
-from wsn_env.models.quantity import parse_overrides, suggest
+from wsn_env.models.quantity import is_line, parse_overrides, short, suggest
 from wsn_env.models.state import Cluster
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.view import View
@@ -33,19 +34,22 @@ def policy_names() -> list[str]:
     return sorted({point.name for point in entry_points(group=GROUP)})
 
 
-def make_policy(name: str, scenario: Scenario, **parameters: Any) -> Policy:
+def make_policy(name: str, scenario: Scenario | str, **parameters: Any) -> Policy:
     """A policy by name, one of your own from a file, or a learned one from the policy.json that train.py saved.
 
     Args:
         name: an entry point's name, one that ends in a number ("nearest3": n = 3), or "FILE.py:Class", with parameters
             after a colon if any ("pre_dc:theta=0.8,phi0_m=3", "mine.py:TwoBest:sharp_m=2"); or a path to a policy.json
             (or its folder).
-        scenario: what it will act in.
+        scenario: what it will act in, or a preset's name.
         parameters: of the policy, for example `make_policy("pre_dc", scenario, theta=0.8)`.
 
     Raises:
         ValueError: for an unknown name, class or parameter.
     """
+    if not isinstance(name, str) or not name:
+        raise ValueError(f"policy {short(repr(name))}: must be a name, FILE.py:CLASS, or the path of a policy.json")
+    scenario = Scenario.of(scenario)
     file, own, rest = name.partition(".py:")
     plain, colon, text = (rest if own else name).partition(":")
     if own:
@@ -71,23 +75,42 @@ def make_policy(name: str, scenario: Scenario, **parameters: Any) -> Policy:
     raise ValueError(f"policy {name!r} is unknown: {suggest(name, policy_names())} {ways}")
 
 
-def named_policies(texts: Sequence[str], scenario: Scenario) -> dict[str, Policy]:
-    """Policies by label, from names, paths of saved policies, "FILE.py:Class", or "label=" and any of these.
+def named_policies(texts: str | Iterable[str] | Mapping[str, Policy], scenario: Scenario) -> dict[str, Policy]:
+    """Policies by label.
+
+    Args:
+        texts: names, paths of saved policies, "FILE.py:Class", or "label=" and any of these, one or several; or a dict
+            of policies by label.
+        scenario: what they will act in.
 
     Raises:
-        ValueError: for an unknown policy, or two with one label.
+        ValueError: for an unknown policy, two with one label, a label that is not one line of text, or none at all.
     """
-    named: dict[str, Policy] = {}
-    for text in dict.fromkeys(texts):
-        if not isinstance(text, str):
-            raise ValueError(
-                f"policies: {type(text).__name__} is no name: give policies of your own as {{name: policy}}"
-            )
-        label, policy = _make_labelled_policy(text, scenario)
-        if label in named:
-            raise ValueError(f"policies: {label!r} is there twice: labels must differ")
-        named[label] = policy
+    if isinstance(texts, Mapping):
+        named = dict(texts)
+        for label, policy in named.items():
+            if isinstance(policy, type) or not callable(getattr(policy, "act", None)):
+                raise ValueError(f"policies[{label!r}] = {short(repr(policy))}: must be a policy, with act(view)")
+    else:
+        named = {}
+        if not isinstance(texts, str) and not isinstance(texts, Iterable):
+            raise ValueError(f"policies: {_NO_NAME.format(type(texts).__name__)}")
+        for text in dict.fromkeys([texts] if isinstance(texts, str) else texts):
+            if not isinstance(text, str):
+                raise ValueError(f"policies: {_NO_NAME.format(type(text).__name__)}")
+            label, policy = _make_labelled_policy(text, scenario)
+            if label in named:
+                raise ValueError(f"policies: {label!r} is there twice: labels must differ")
+            named[label] = policy
+    if not named:
+        raise ValueError("policies: must name at least one")
+    for label in named:
+        if not is_line(label):
+            raise ValueError(f"policies: label {label!r}: must be one line of text, without control characters")
     return named
+
+
+_NO_NAME = "{} is no name: give policies of your own as {{name: policy}}"
 
 
 def _make_labelled_policy(text: str, scenario: Scenario) -> tuple[str, Policy]:
@@ -116,10 +139,23 @@ def _create_policy(name: str, maker, scenario: Scenario, parameters: dict) -> Po
     try:
         policy = maker(scenario=scenario, **parameters)
     except TypeError as problem:
-        raise ValueError(f"policy {name!r}: cannot be made with a scenario and its parameters: {problem}") from problem
+        instead = _suggest_parameter(maker, parameters)
+        raise ValueError(
+            f"policy {name!r}: cannot be made with a scenario and its parameters: {problem}{instead}"
+        ) from problem
     if not callable(getattr(policy, "act", None)):
         raise ValueError(f"policy {name!r}: has no act(view)")
     return policy
+
+
+def _suggest_parameter(maker: Any, parameters: dict) -> str:
+    """ ": did you mean theta?", if one of the parameters is not the policy's."""
+    try:
+        own = [name for name in signature(maker).parameters if name != "scenario"]
+    except (TypeError, ValueError):  # a class without a signature
+        return ""
+    strange = [name for name in parameters if name not in own]
+    return f": {suggest(strange[0], own)}" if strange and own else ""
 
 
 def load_learned(path: Path, scenario: Scenario) -> Policy:

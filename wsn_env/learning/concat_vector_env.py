@@ -10,6 +10,8 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
+from wsn_env.envs.interface import check_options
+from wsn_env.envs.vector_env import row_seeds
 from wsn_env.evaluation.native_envs import unwrap_native
 
 
@@ -46,15 +48,15 @@ class ConcatVectorEnv(gym.vector.VectorEnv):
         self, *, seed: int | Sequence[int] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """New episodes, in the rows of options["reset_mask"] only where there is one."""
-        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else seed
+        check_options(options)
+        seeds = row_seeds(seed, self.num_envs)
         mask = (options or {}).get("reset_mask")
         infos = []
         for i, (part, rows) in enumerate(zip(self.parts, self._rows)):
             info: dict[str, Any] = {}
             if mask is None or mask[rows].any():
                 own = {} if mask is None else {"options": {"reset_mask": mask[rows]}}
-                # A native environment takes a seed for each row.
-                of_rows: Any = None if seeds is None else list(seeds[rows])
+                of_rows: Any = seeds[rows]  # a native environment takes a seed for each row
                 self._observations[i], info = part.reset(seed=of_rows, **own)
             infos.append(info)
         return self._join_observations(self._observations), self._join_infos(infos)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from wsn_env.evaluation.files import alone_in
 from wsn_env.evaluation.progress import Progress
-from wsn_env.models.quantity import suggest
+from wsn_env.models.quantity import suggest, whole_number
 
 PAPERS = {name: f"wsn_env.papers.{name}" for name in ("pre_dc", "binary", "grnn", "underwater")}
 
@@ -26,8 +26,7 @@ def reproduce(name: str, out: str | Path, runs: int = 100, progress: Progress | 
     """
     if name not in (*PAPERS, "all"):
         raise ValueError(f"paper {name!r} is unknown: {suggest(str(name), (*PAPERS, 'all'))}")
-    if isinstance(runs, bool) or not isinstance(runs, int) or runs < 2:
-        raise ValueError(f"runs = {runs!r}: must be a whole number, at least 2 (standard errors need two)")
+    runs = whole_number("runs", runs, 2)  # standard errors need two
     for paper, module in PAPERS.items():
         if name in (paper, "all"):
             folder = Path(out) / paper if name == "all" else Path(out)

@@ -20,7 +20,17 @@ from wsn_env.models.measurement.position import Position
 from wsn_env.models.motion.base import Motion
 from wsn_env.models.motion.crossing import Crossing
 from wsn_env.models.own import kind_and_settings
-from wsn_env.models.quantity import NUMBERS, ScenarioError, Section, quantity, suggest
+from wsn_env.models.quantity import (
+    NUMBERS,
+    ScenarioError,
+    Section,
+    UnknownQuantity,
+    is_line,
+    plain,
+    quantity,
+    short,
+    suggest,
+)
 from wsn_env.models.radio.base import Link
 from wsn_env.models.radio.radio import Radio
 from wsn_env.models.recordings.calibration_file import read_quantities
@@ -74,12 +84,16 @@ class Scenario(Section):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if isinstance(self.lam, np.ndarray):
+            object.__setattr__(self, "lam", plain(tuple(self.lam)) if self.lam.ndim else self.lam.item())
         for name, part in PARTS.items():
             value = getattr(self, name)
             if not isinstance(value, part):
                 raise ScenarioError(f"Scenario.{name} = {value!r}: must be a {_words(name, part)}")
             if isinstance(value, Kind):
                 value.check_functions()
+        if not is_line(self.name):
+            raise ScenarioError(f"Scenario.name = {self.name!r}: must be one line of text, without control characters")
         if self.unscored >= self.periods:
             raise ScenarioError(f"Scenario.unscored = {self.unscored}: must be below periods = {self.periods}")
         if self.ends_outside and self.unscored:
@@ -186,7 +200,9 @@ class Scenario(Section):
     @classmethod
     def of(cls, scenario: str | Scenario, /, **overrides: Unpack[Quantities]) -> Scenario:
         """A scenario from a preset's name or from a scenario, with overrides by quantity."""
-        return scenario.override(**overrides) if isinstance(scenario, Scenario) else cls.named(scenario, **overrides)
+        if not isinstance(scenario, Scenario):
+            return cls.named(scenario, **overrides)
+        return scenario.override(**overrides) if overrides else scenario
 
     @classmethod
     def named(cls, name: str, /, **overrides: Unpack[Quantities]) -> Scenario:
@@ -196,10 +212,14 @@ class Scenario(Section):
             name: one of `named_scenarios()`, with or without "wsn_env/".
             overrides: as for `override`.
         """
-        short = name.removeprefix("wsn_env/")
-        if short not in named_scenarios():
-            raise ScenarioError(f"scenario {name!r} is unknown: {suggest(short, named_scenarios())}")
-        return named_scenarios()[short].override(**overrides)
+        if not isinstance(name, str):
+            raise ScenarioError(
+                f"scenario = {short(repr(name))}: must be a Scenario or a name: {', '.join(named_scenarios())}"
+            )
+        plain_name = name.removeprefix("wsn_env/")
+        if plain_name not in named_scenarios():
+            raise ScenarioError(f"scenario {name!r} is unknown: {suggest(plain_name, named_scenarios())}")
+        return named_scenarios()[plain_name].override(**overrides)
 
     def override(self, **quantities: Unpack[Quantities]) -> Scenario:
         """A copy with some quantities changed, whatever section they stand in.
@@ -223,13 +243,11 @@ class Scenario(Section):
                     whole[name] = kind(**given)
                 except TypeError:
                     strange = next(key for key in given if key not in own)
-                    raise ScenarioError(
-                        f"{kind.__name__} has no quantity {strange!r}: {suggest(strange, own)}"
-                    ) from None
+                    raise UnknownQuantity(kind.__name__, strange, own) from None
         for item in fields(self):
             if item.name in changes:
                 whole[item.name] = changes.pop(item.name)
-        known: dict[str, Any] = {}
+        known: dict[str, Any] = dict.fromkeys(("calibration", *PARTS))
         for item in fields(self):
             section: Any = whole.get(item.name, getattr(self, item.name))
             if is_dataclass(section):
@@ -242,8 +260,10 @@ class Scenario(Section):
             else:
                 known[item.name] = None
         if changes:
-            name = next(iter(changes))
-            raise ScenarioError(f"scenario has no quantity {name!r}: {suggest(name, known)}")
+            name, owners = next(iter(changes)), _kinds_with_quantities()
+            if name in owners:
+                raise ScenarioError(f"scenario has no quantity {name!r}: it is one of {' and '.join(owners[name])}")
+            raise UnknownQuantity("scenario", name, known | owners)
         motion = whole.get("motion", self.motion)
         if isinstance(motion, Motion) and motion != self.motion and "periods" not in whole:
             horizon = motion.horizon(whole.get("period_s", self.period_s))
@@ -278,6 +298,16 @@ def _words(name: str, part: type) -> str:
     """What a part of a scenario may be."""
     kinds = BY_NAME[name].kinds.values() if name in BY_NAME else ()
     return " or ".join(kind.__name__ for kind in kinds) or part.__name__
+
+
+def _kinds_with_quantities() -> dict[str, list[str]]:
+    """By quantity, the kinds that have it: {"amplitude_m": ["motion='sine'"], ...}."""
+    owners: dict[str, list[str]] = {}
+    for role, registry in BY_NAME.items():
+        for name, kind in registry.kinds.items():
+            for item in fields(kind):
+                owners.setdefault(item.name, []).append(f"{role}={name!r}")
+    return owners
 
 
 @cache

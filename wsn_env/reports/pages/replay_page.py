@@ -6,7 +6,7 @@ from pathlib import Path
 
 from wsn_env.evaluation.files import check_replaceable, replacing
 from wsn_env.evaluation.policies import Policy
-from wsn_env.models.quantity import ScenarioError
+from wsn_env.models.quantity import ScenarioError, whole_number
 from wsn_env.reports.pages.page import build_page, fill_template, json_for_script, read_template
 from wsn_env.reports.pages.recording import Recording, record
 from wsn_env.scenario import Scenario
@@ -30,9 +30,8 @@ def replay(policies: dict[str, Policy], scenario: Scenario, seed: int, out: str 
         raise ValueError(f"policies = {', '.join(policies) or 'none'}: must be one or two")
     if scenario.lam_range[0] != scenario.lam_range[1]:
         raise ScenarioError(f"Scenario.lam = {scenario.lam!r}: must be one number for a replay")
-    if seed < 0:
-        raise ValueError(f"seed = {seed}: must be at least 0")
     check_replaceable(out)
+    seed = whole_number("seed", seed, 0)
     recording = record(policies, scenario, seed)
     page = build_page("replay", f"{scenario.name}, seed {seed}", player_html(recording))
     Path(out).parent.mkdir(parents=True, exist_ok=True)
