@@ -12,7 +12,7 @@ from wsn_env.compiled.kernels import Pinned, kernel, lean_piece
 from wsn_env.envs.expectations import PLACES, REPORTS, Expectations, outlook_of
 from wsn_env.envs.merit import KEEP, NEAREST, ORDERS, RANKED, rank_row
 from wsn_env.models.measurement.base import Order
-from wsn_env.models.quantity import short, suggest, whole_number
+from wsn_env.models.quantity import short, suggest
 from wsn_env.models.state import KEEP_CLUSTER, Cluster, knowledge_at
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import common_constants
@@ -284,4 +284,4 @@ def make_action(name: ActionName, scenario: Scenario, order: Order, candidates: 
         raise ValueError(f"action {name!r} is unknown: {suggest(name, ACTIONS)}")
     if order not in ORDERS:
         raise ValueError(f"order {order!r} is unknown: {suggest(order, ORDERS)}")
-    return ACTIONS[name](scenario, order, whole_number("candidates", candidates, 1))
+    return ACTIONS[name](scenario, order, candidates)

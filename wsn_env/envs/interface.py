@@ -13,7 +13,7 @@ from wsn_env.envs.info import period_info
 from wsn_env.envs.observations import Observation, ObservationName, make_observation
 from wsn_env.envs.rewards import RewardName, make_reward, reward_space
 from wsn_env.models.measurement.base import Order
-from wsn_env.models.quantity import UnknownQuantity, short
+from wsn_env.models.quantity import UnknownQuantity, short, whole_number
 from wsn_env.scenario import Scenario
 
 
@@ -26,6 +26,9 @@ class Settings:
     reward: RewardName = "error"
     order: Order = "nearest"
     candidates: int = 12
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "candidates", whole_number("candidates", self.candidates, 1))
 
 
 def scenario_of(scenario: str | Scenario, overrides: Any, environment: Callable[..., Any]) -> Scenario:
