@@ -68,9 +68,12 @@ def test_the_extended_filter_unwraps_angles(bearing):
 def test_the_menu_and_the_order_of_information_see_across(bearing):
     """Two bearings from one side tell less than two at a right angle; the second candidate is the one across."""
     scenario = Scenario.named("PreDC-v0", measurement=bearing(), positions=((50.0, 44.0), (50.0, 43.0), (44.0, 50.0)))
-    view = View.of(World(scenario.override(start="field", **SMALL)).reset([1]))
-    view.belief["predicted_mean"], view.belief["predicted_cov"] = (50, 0, 50, 0), np.diag([4.0, 0.1, 4.0, 0.1])
-    cluster = make_policy("informed1", scenario).act(view)
+    state = World(scenario.override(start="field", **SMALL)).reset([1])
+    state.belief.row["predicted_mean"], state.belief.row["predicted_cov"] = (
+        (50, 0, 50, 0),
+        np.diag([4.0, 0.1, 4.0, 0.1]),
+    )
+    cluster = make_policy("informed1", scenario).act(View.of(state))
     assert {int(cluster.head[0]), *cluster.members[0].tolist()} - {-1} == {0, 2}
     env = gym.make("wsn_env/PreDC-v0", measurement=bearing(), observation="menu", **SMALL)
     low, high = (env.reset(seed=seed)[0] for seed in (1, 2))
