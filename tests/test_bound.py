@@ -114,12 +114,12 @@ def test_its_standard_error_is_that_of_blocks():
 
 @pytest.mark.parametrize(
     ("count", "particles"),
-    [(12, 100_000), pytest.param(2000, 5000, marks=[pytest.mark.slow, pytest.mark.full])],
+    [(8, 100_000), pytest.param(2000, 5000, marks=[pytest.mark.slow, pytest.mark.full])],
 )
 @pytest.mark.parametrize("name", study.FREE)
 def test_a_filter_that_is_given_all_laws_does_not_beat_it(name, count, particles):
     """Root mean square error over the bound: not below 1 by more than two standard errors."""
-    short = {} if count > 1000 else dict(periods=25)
+    short = {} if count > 1000 else dict(periods=20)
     scenario = study.make_scenario(name, (study.FREE[name] + " search=False").split(), [], **short)
     asked = study.Study([name], ["nearest3"], count, particles)
     found = study.compare("nearest3", scenario, asked, lambda *_: None)
