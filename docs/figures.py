@@ -2,7 +2,7 @@
 
     python docs/figures.py                      # all that need no training; an hour on 2 cores
     python docs/figures.py reproduce tables     # some of MAKERS
-    python docs/figures.py --fill               # the pages anew from what is there in out/figures
+    python docs/figures.py --fill               # run nothing: the pages anew from what is there in out/figures
 
 A command writes tables as NAME.md, and pictures, into out/figures/MAKER. A page shows them between markers,
 `<!-- begin MAKER/NAME -->` and `<!-- end MAKER/NAME -->`, and as `images/MAKER/NAME.png`. Makers that train policies
@@ -102,13 +102,12 @@ def make(name: str) -> None:
     print(f"{name}: {time.perf_counter() - start:.0f} s", flush=True)
 
 
-def fill(out: Path = OUT) -> list[Path]:
-    """Fill every page from the commands' folders that are there, and renew its pictures. Returns the pages changed.
+def fill(made: Sequence[str], out: Path = OUT) -> list[Path]:
+    """Fill every page from the folders of these makers, and renew its pictures. Returns the pages changed.
 
     Raises:
         ValueError: if a page names a table that its command did not write.
     """
-    made = [name for name in ALL if (out / name).is_dir()]
     changed = []
     for page in pages():
         old = page.read_text(encoding="utf-8")
@@ -140,9 +139,10 @@ def main() -> None:
     unknown = [name for name in asked.names if name not in ALL]
     if unknown:
         parser.error(f"names = {unknown}: unknown; allowed are {', '.join(ALL)}")
-    for name in [] if asked.fill else asked.names or MAKERS:
+    made = asked.names or [name for name in (ALL if asked.fill else MAKERS) if not asked.fill or (OUT / name).is_dir()]
+    for name in [] if asked.fill else made:
         make(name)
-    for page in fill():
+    for page in fill(made):
         print(f"renewed: {page.relative_to(ROOT)}")
 
 
