@@ -57,7 +57,8 @@ def test_the_tutorials_policy_joins_a_comparison(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_no_block_is_empty(page):
-    assert not [name for _, name, content in found_blocks(page.read_text()) if not content.strip()]
+    empty = {name for _, name, content in found_blocks(page.read_text()) if not content.strip()}
+    assert empty <= {"further"}  # of performance.md: claims without a place of their own
 
 
 def test_the_readme_is_short():

@@ -13,7 +13,7 @@ from rich.console import Console
 from wsn_env import Scenario, evaluate, make_policy
 from wsn_env.cli import main
 from wsn_env.evaluation import progress
-from wsn_env.reports.front_tables import print_and_save_fronts
+from wsn_env.reports.front_tables import save_and_print_fronts
 from wsn_env.reports.markdown import escape_markdown, markdown_table
 from wsn_env.reports.pages.evaluation_page import write_report
 from wsn_env.reports.tables import print_tables, save_markdown
@@ -41,7 +41,7 @@ def compared(request):
 def test_the_terminal_shows_labels_as_they_are(compared, capsys):
     policies, evaluation = compared
     print_tables(evaluation)
-    print_and_save_fronts(evaluation)
+    save_and_print_fronts(evaluation)
     shown = capsys.readouterr().out
     for label in policies:
         assert f" {label.strip()} " in shown
@@ -65,7 +65,7 @@ def test_files_pages_and_pictures_take_every_label(tmp_path):
     evaluation = evaluate(policies, SMALL, [1.0, 4.0], episodes=2)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        print_and_save_fronts(evaluation, tmp_path)
+        save_and_print_fronts(evaluation, tmp_path)
         evaluation.save(tmp_path)
         page = write_report(tmp_path, evaluation, policies).read_text(encoding="utf-8")
     with open(tmp_path / "evaluation.csv", newline="", encoding="utf-8") as file:

@@ -21,6 +21,8 @@ from wsn_env.papers.pre_dc.systems import NODES, SYSTEMS, motion_trial, scenario
 from wsn_env.papers.rollout import Trial, exceeds, play, play_all, standard_error
 from wsn_env.papers.sheet import show_table
 
+pytestmark = pytest.mark.xdist_group("reproduction")  # one process makes its files once
+
 ROOT = Path(__file__).parents[1]
 FIGURES = ("detection", "fig1", "fig2", "fig3", "fig4", "fig5", "fig6", "fig7", "fig8")
 COLUMNS = {

@@ -20,6 +20,8 @@ from wsn_env.papers.binary.systems import FLIP, SYSTEMS, Setting
 from wsn_env.papers.claim import HOLDS, NOT_REPRODUCED, UNDER_READING
 from wsn_env.papers.rollout import exceeds, play, standard_error
 
+pytestmark = pytest.mark.xdist_group("reproduction_binary")  # one process makes its files once
+
 ROOT = Path(__file__).parents[1]
 SWEEPS = ("nodes", "radius", "period")
 TABLES = ("systems", "readings", "faults", "unequal", "crossings", "error", "claims", "expected")

@@ -38,6 +38,8 @@ from wsn_env.papers.grnn.systems import (
 from wsn_env.papers.grnn.targets import follow
 from wsn_env.papers.rollout import exceeds, play
 
+pytestmark = pytest.mark.xdist_group("reproduction_grnn")  # one process makes its files once
+
 ERRORS = ",".join(
     f"{name}_m,{name}_stderr_m" for name in ("rmse", "mean_error", "rmse_x", "rmse_y", "mean_error_x", "mean_error_y")
 )

@@ -33,6 +33,8 @@ from wsn_env.papers.underwater.systems import (
 )
 from wsn_env.papers.underwater.tables import SHOWN
 
+pytestmark = pytest.mark.xdist_group("reproduction_underwater")  # one process makes its files once
+
 TABLES = (*SHOWN, "error", "claims", "additions", "expected")
 PICTURES = ("error", "thresholds", "energy")
 

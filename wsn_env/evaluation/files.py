@@ -60,6 +60,7 @@ def alone_in(folder: str | Path, names: Iterable[str] = ()) -> Iterator[None]:
         ValueError: another run writes into it, it is no folder, or files cannot be written there.
     """
     folder = Path(folder)
+    there = folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
@@ -85,6 +86,9 @@ def alone_in(folder: str | Path, names: Iterable[str] = ()) -> Iterator[None]:
         with suppress(OSError):  # Windows removes no open file: there it stays, unlocked
             lock.unlink()
         os.close(file)
+        if not there:
+            with suppress(OSError):  # one that nothing was written into goes again
+                folder.rmdir()
 
 
 def _lock(path: Path) -> int:
