@@ -46,7 +46,7 @@ examples: $(READY)
 bench: $(VENV)/.bench
 	$(RUN) -m benchmarks
 
-# A glance at the same claims, a minute, with the peers that are there; docs/performance.md stays.
+# A glance at the shorter of the same claims, a minute, with the peers that are there; docs/performance.md stays.
 bench-short: $(READY)
 	$(RUN) -m benchmarks --short
 

@@ -236,11 +236,10 @@ def test_who_listens_in_vain_is_taken_for_weak_until_heard_again():
 
 
 def test_the_round_goes_from_quadrant_to_quadrant():
-    view = View.of(playing(BLE, "quadrants", 1))
-    seen = []
+    state, seen = playing(BLE, "quadrants", 1), []
     for period in range(4):
-        view.row["period"] = period
-        nodes = make_policy("quadrants", BLE).act(view).members[0]
+        state.row["period"] = period
+        nodes = make_policy("quadrants", BLE).act(View.of(state)).members[0]
         assert len(nodes) == 3
         seen.extend(nodes.tolist())
     assert sorted(seen) == list(range(12))  # everybody once in four periods

@@ -112,11 +112,19 @@ def test_its_standard_error_is_that_of_blocks():
     assert 0.5 * apart < bound.stderr_m() < 2 * apart
 
 
+SHORT, LONG = ("PreDC-v0", "Anchors-v0"), [pytest.mark.slow, pytest.mark.full]
+
+
 @pytest.mark.parametrize(
-    ("count", "particles"),
-    [(8, 100_000), pytest.param(2000, 5000, marks=[pytest.mark.slow, pytest.mark.full])],
+    ("name", "count", "particles"),
+    [
+        *(
+            pytest.param(name, 8, 100_000, marks=[] if name in ("PreDC-v0", "Anchors-v0") else LONG)
+            for name in study.FREE
+        ),
+        *(pytest.param(name, 2000, 5000, marks=LONG) for name in study.FREE),
+    ],
 )
-@pytest.mark.parametrize("name", study.FREE)
 def test_a_filter_that_is_given_all_laws_does_not_beat_it(name, count, particles):
     """Root mean square error over the bound: not below 1 by more than two standard errors."""
     short = {} if count > 1000 else dict(periods=20)
