@@ -109,5 +109,5 @@ def _uniform_rows(seeds, out):
 def uniforms(seeds: Any, count: int) -> np.ndarray:
     """U[0, 1) numbers for policies: (B, count) from the view's `random_bits` (B,), alike in every batch."""
     out = np.empty((len(seeds), count))
-    _uniform_rows(np.ascontiguousarray(seeds, dtype=np.uint32), out)
+    _uniform_rows(np.array(seeds, dtype=np.uint32), out)  # a copy: of read-only arrays it would be compiled once more
     return out
