@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tests.figures import check_tables
+from wsn_env.evaluation.intervals import standard_error
 from wsn_env.papers import reproduce
 from wsn_env.papers.claim import HOLDS, NOT_REPRODUCED, UNDER_READING, Expectation, judge_claim, print_expected
 from wsn_env.papers.pre_dc.claims import pre_dc_is_best
@@ -18,7 +19,7 @@ from wsn_env.papers.pre_dc.coverage import COVERAGE
 from wsn_env.papers.pre_dc.expected import EXPECTED_RMS_M, PAPER_RMS_M
 from wsn_env.papers.pre_dc.measures import LOST_M, WINDOW, periods_tracked, ratio, sd_over_periods_m
 from wsn_env.papers.pre_dc.systems import NODES, SYSTEMS, motion_trial, scenario_as_read
-from wsn_env.papers.rollout import Trial, exceeds, play, play_all, standard_error
+from wsn_env.papers.rollout import Trial, exceeds, play, play_all
 from wsn_env.papers.sheet import show_table
 
 pytestmark = pytest.mark.xdist_group("reproduction")  # one process makes its files once

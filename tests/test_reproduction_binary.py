@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.figures import check_tables
+from wsn_env.evaluation.intervals import standard_error
 from wsn_env.papers import reproduce
 from wsn_env.papers.binary.coverage import COVERAGE
 from wsn_env.papers.binary.doubt import bootstrap
@@ -18,7 +19,7 @@ from wsn_env.papers.binary.results import Results, first_crossing
 from wsn_env.papers.binary.study import Study
 from wsn_env.papers.binary.systems import FLIP, SYSTEMS, Setting
 from wsn_env.papers.claim import HOLDS, NOT_REPRODUCED, UNDER_READING
-from wsn_env.papers.rollout import exceeds, play, standard_error
+from wsn_env.papers.rollout import exceeds, play
 
 pytestmark = pytest.mark.xdist_group("reproduction_binary")  # one process makes its files once
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from math import floor, isfinite, log10
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 RESAMPLES = 2000
+DRAWN_SETS = 200  # for a standard error
 KEPT_EPISODES = 5000  # the resamples of more take too much memory to keep
 
 
@@ -46,9 +48,8 @@ class Summary:
         return cls(float(value), float(low), float(high))
 
 
-@dataclass(frozen=True)
-class Measured:
-    """A measured figure and its standard error over episodes; as text "1.23 (0.04)", two digits of the error."""
+class Measured(NamedTuple):
+    """A measured figure and its standard error; as text "1.23 (0.04)", two digits of the error."""
 
     value: float
     stderr: float
@@ -56,26 +57,51 @@ class Measured:
     @classmethod
     def mean(cls, values: np.ndarray) -> Measured:
         """Of values (episodes,)."""
-        return cls(float(np.mean(values)), float(np.std(values, ddof=1) / len(values) ** 0.5))
+        return cls(float(np.mean(values)), standard_error(values))
+
+    @classmethod
+    def ratio(cls, over: np.ndarray, under: np.ndarray) -> Measured:
+        """Ratio of the means of pairs (episodes,), by the delta method."""
+        found = float(np.mean(over) / np.mean(under))
+        return cls(found, standard_error(over - found * under) / float(np.mean(under)))
 
     @classmethod
     def root_mean(cls, squares: np.ndarray) -> Measured:
         """Root of the mean of squares (episodes,), by the delta method."""
-        mean = cls.mean(squares)
-        root = mean.value**0.5
-        return cls(root, mean.stderr / (2 * root))
+        return cls.mean(squares).root()
 
     @classmethod
     def root_ratio(cls, squares: np.ndarray, others: np.ndarray) -> Measured:
         """Root of the ratio of the means of squares in pairs (episodes,), by the delta method."""
-        ratio = float(np.sqrt(np.mean(squares) / np.mean(others)))
-        return cls(ratio, 0.5 * ratio * cls.mean(squares / np.mean(squares) - others / np.mean(others)).stderr)
+        return cls.ratio(squares, others).root()
+
+    @classmethod
+    def bootstrap(cls, statistic: Callable[[np.ndarray], float], episodes: int) -> Measured:
+        """A statistic of all episodes; its standard error is its sd over sets of them drawn with replacement.
+
+        Args:
+            statistic: of the episodes by number (episodes,); sets of which it is NaN are left out.
+        """
+        rng = np.random.default_rng(0)
+        values = np.array([statistic(rng.integers(episodes, size=episodes)) for _ in range(DRAWN_SETS)])
+        values = values[np.isfinite(values)]
+        return cls(statistic(np.arange(episodes)), float(values.std()) if len(values) > 1 else float("nan"))
+
+    def root(self) -> Measured:
+        """The figure's square root."""
+        root = self.value**0.5
+        return Measured(root, self.stderr / (2 * root))
 
     def __str__(self) -> str:
         if not self.stderr or not isfinite(self.stderr):
             return f"{self.value:.4g}"
         digits = max(0, 1 - floor(log10(self.stderr)))
         return f"{self.value:.{digits}f} ({self.stderr:.{digits}f})"
+
+
+def standard_error(values: np.ndarray) -> float:
+    """Of the mean of values (episodes,)."""
+    return float(np.std(values, ddof=1) / len(values) ** 0.5)
 
 
 def resampled_means(values: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from math import ceil
 
 import numpy as np
 
+from wsn_env.evaluation.intervals import Measured, standard_error
 from wsn_env.evaluation.policies import Policy, make_policy
 from wsn_env.evaluation.progress import Progress
 from wsn_env.evaluation.rollout import BLOCK, FIRST_SEED, episodes
@@ -79,7 +80,7 @@ class Record:
         """(R,) the same along x (0) or y (1) alone."""
         return np.sqrt((self.offset_m[:, :, axis] ** 2).mean(axis=1))
 
-    def pooled_rms_m(self, axis: int | None = None) -> tuple[float, float]:
+    def pooled_rms_m(self, axis: int | None = None) -> Measured:
         """Root of the mean square error over all runs and periods, along an axis or both, and its standard error."""
         return pooled_rms(self.square_error() if axis is None else self.offset_m[:, :, axis] ** 2)
 
@@ -127,15 +128,9 @@ def _play_block(world: World, policy: Policy, runs: range, tick: Callable[[], No
     return tuple(np.stack(arrays, axis=1) for arrays in zip(*periods, strict=True))
 
 
-def standard_error(values: np.ndarray) -> float:
-    """Of the mean over runs."""
-    return float(np.std(values, ddof=1) / np.sqrt(len(values)))
-
-
-def pooled_rms(square: np.ndarray) -> tuple[float, float]:
-    """Root of the mean of squares (R, K), and its standard error over the runs (by the delta method)."""
-    rms = float(np.sqrt(square.mean()))
-    return rms, standard_error(square.mean(axis=1)) / (2 * rms)
+def pooled_rms(square: np.ndarray) -> Measured:
+    """Root of the mean of squares (R, K), with its standard error over the runs."""
+    return Measured.root_mean(square.mean(axis=1))
 
 
 def exceeds(larger: np.ndarray, smaller: np.ndarray) -> bool:

@@ -40,8 +40,10 @@ def why_no_bound(scenario: Scenario) -> str | None:
         return f"Tracking.start = {scenario.tracking.start!r}: allowed is 'known', whose error is normal"
     if scenario.tracking.search:
         return "Tracking.search = True: the choice of a head tells of strengths; allowed is False"
-    if scenario.ends_outside or scenario.unscored:
-        return "Scenario.ends_outside, unscored: the mean is over the whole horizon; allowed are False and 0"
+    if scenario.ends_outside:
+        return "Scenario.ends_outside = True: the mean is over the whole horizon; allowed is False"
+    if scenario.unscored:
+        return f"Scenario.unscored = {scenario.unscored}: the mean is over the whole horizon; allowed is 0"
     return None
 
 
@@ -60,10 +62,8 @@ class Bound:
         if why := why_no_bound(scenario):
             raise ValueError(why)
         self._scenario, self._constants, self._threads = scenario, constants(scenario), threads
-        self._sums: list[
-            np.ndarray
-        ] = []  # by block: (periods, 3) information along, across, along times across [1/m^2]
-        self._episodes: list[int] = []  # by block
+        self._sums: list[np.ndarray] = []  # (periods, 3) of each block: along, across, along times across [1/m^2]
+        self._episodes: list[int] = []  # of each block
 
     def begin(self, state: State) -> None:
         """New episodes, in period 0."""
@@ -79,8 +79,9 @@ class Bound:
             ValueError: when a node has died: who was awake is then no longer known.
         """
         if (outcome.alive < self._scenario.field.nodes).any():
-            battery = self._scenario.radio.battery_j
-            raise ValueError(f"Link.battery_j = {battery}: a node died; the bound needs batteries that last")
+            radio = self._scenario.radio
+            what = f"{type(radio).__name__}.battery_j = {radio.battery_j}"
+            raise ValueError(f"{what}: a node died; the bound needs batteries that last")
         found = np.empty((state.rows, 3))
         args = self._constants, outcome.row, state.handle, self._along, found
         over_rows(_information_of_awake, state.rows, self._threads, *args)

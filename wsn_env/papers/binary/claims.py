@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from wsn_env.papers.binary.doubt import Figure, mean_of
+from wsn_env.evaluation.intervals import Measured
 from wsn_env.papers.binary.energy import judge_energy
 from wsn_env.papers.binary.results import Results
 from wsn_env.papers.binary.study import Study
@@ -85,12 +85,12 @@ def _printed(study: Study) -> Claim:
 
 
 def _means(errors: dict[str, np.ndarray]) -> str:
-    return "mean error " + ", ".join(f"{name} {mean_of(runs)}" for name, runs in errors.items()) + " m"
+    return "mean error " + ", ".join(f"{name} {Measured.mean(runs)}" for name, runs in errors.items()) + " m"
 
 
 def _row(runs: list[np.ndarray]) -> str:
-    return ", ".join(str(mean_of(values)) for values in runs)
+    return ", ".join(str(Measured.mean(values)) for values in runs)
 
 
-def _seconds(crossing: Figure) -> str:
+def _seconds(crossing: Measured) -> str:
     return f"at {crossing} s" if np.isfinite(crossing.value) else f"nowhere up to {PERIODS_S[-1]:g} s"

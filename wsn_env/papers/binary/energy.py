@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from wsn_env.papers.binary.doubt import bootstrap, mean_of
+from wsn_env.evaluation.intervals import Measured
 from wsn_env.papers.binary.readings import even_period_s, transmitting_nodes
 from wsn_env.papers.binary.results import Results
 from wsn_env.papers.binary.systems import NODES, PERIODS_S, RADII_M, Setting, vary
@@ -29,6 +29,11 @@ def _counts(results: Results, system: str, keyword: str, values: Sequence[float]
     return [results.reporting(setting) for setting in vary(system, keyword, values)]
 
 
+def _at_ends(counts: list[np.ndarray], between: str) -> str:
+    """At the shortest and the longest sampling period."""
+    return between.join(f"{Measured.mean(counts[k])} at {PERIODS_S[k]:g} s" for k in (0, -1))
+
+
 def _fewer_reports(results: Results) -> Claim:
     nodes, energy = (
         [quantity(Setting(name)) for name in ("paper", "centroid")]
@@ -41,10 +46,8 @@ def _fewer_reports(results: Results) -> Claim:
         for pair in zip(*(_counts(results, name, keyword, values) for name in ("centroid", "paper")), strict=True)
     ]
     at_default = exceeds(nodes[1], nodes[0]) and exceeds(energy[1], energy[0])
-    ours = (
-        f"at T = 1 s {mean_of(nodes[0])} instead of {mean_of(nodes[1])} nodes, {mean_of(energy[0])} instead of"
-        f" {mean_of(energy[1])} mJ a period; more from T = {results.even_s()} s on"
-    )
+    counts, costs = (" instead of ".join(str(Measured.mean(runs)) for runs in pair) for pair in (nodes, energy))
+    ours = f"at T = 1 s {counts} nodes, {costs} mJ a period; more from T = {results.even_s()} s on"
     what = "fewer nodes transmit than with the centroid"
     return Claim(what, "fewer (a figure)", ours, judge_claim(all(exceeds(*pair) for pair in pairs), at_default))
 
@@ -61,12 +64,13 @@ def _slow_against_steep(
     def factor(system: int, runs: np.ndarray) -> float:
         return ends[system][1][runs].mean() / ends[system][0][runs].mean()
 
-    factors = [bootstrap(partial(factor, system), results.runs) for system in (0, 1)]
-    gap = bootstrap(lambda runs: factor(1, runs) - factor(0, runs), results.runs)
+    factors = [Measured.bootstrap(partial(factor, system), results.runs) for system in (0, 1)]
+    gap = Measured.bootstrap(lambda runs: factor(1, runs) - factor(0, runs), results.runs)
     laws = [transmitting_nodes(last) / transmitting_nodes(first) for first, *_, last in settings]
+    more = " and ".join(str(Measured.mean(slope)) for slope in slopes)
     ours = (
-        f"{mean_of(slopes[0])} and {mean_of(slopes[1])} nodes more with every {step[1]}; from {values[0]:g} to"
-        f" {values[-1]:g} by factors {factors[0]} and {factors[1]} (closed forms {laws[0]:.2f} and {laws[1]:.2f})"
+        f"{more} nodes more with every {step[1]}; from {values[0]:g} to {values[-1]:g} by factors {factors[0]} and"
+        f" {factors[1]} (closed forms {laws[0]:.2f} and {laws[1]:.2f})"
     )
     steeper = exceeds(slopes[1], slopes[0])
     claim = f"the transmitting nodes of the boundary method grow slowly with the {what}, the centroid's steeply"
@@ -78,18 +82,15 @@ def _over_periods(results: Results) -> Iterator[Claim]:
     boundary, centroid = (_counts(results, name, "period_s", PERIODS_S) for name in ("paper", "centroid"))
     grows = keeps_falling(boundary[::-1])
     ours = (
-        f"from {mean_of(boundary[0])} at {PERIODS_S[0]:g} s to {mean_of(boundary[-1])} at {PERIODS_S[-1]:g} s; as many"
+        f"from {_at_ends(boundary, ' to ')}; as many"
         f" as the centroid's at {results.even_s()} s (closed form {even_period_s():.2f} s)"
     )
     what = "the transmitting nodes of the boundary method grow with the sampling period T"
     yield Claim(what, "grow (a figure)", ours, judge_claim(grows, grows))
-    change = mean_of(centroid[-1] - centroid[0])
+    change = Measured.mean(centroid[-1] - centroid[0])
     most = abs(change.value) + SIGNIFICANT * change.stderr
     still = abs(change.value) <= SIGNIFICANT * change.stderr and most < STEADY_SHARE * centroid[0].mean()
-    ours = (
-        f"{mean_of(centroid[0])} at {PERIODS_S[0]:g} s, {mean_of(centroid[-1])} at {PERIODS_S[-1]:g} s; paired change"
-        f" {change}"
-    )
+    ours = f"{_at_ends(centroid, ', ')}; paired change {change}"
     yield Claim(
         "the centroid's transmitting nodes do not depend on T", "constant (a figure)", ours, judge_claim(still, still)
     )

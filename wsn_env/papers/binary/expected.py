@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wsn_env.papers.binary.doubt import Figure, mean_of
+from wsn_env.evaluation.intervals import Measured
 from wsn_env.papers.binary.readings import PAIRS, SHIFTS, boundary_nodes, detecting_nodes, even_period_s
 from wsn_env.papers.binary.results import Results
 from wsn_env.papers.binary.study import Study
@@ -61,7 +61,7 @@ def _closed_forms() -> Iterator[Expectation]:
 
 def _defaults(results: Results) -> Iterator[Expectation]:
     for name, figures in ANTNP.items():
-        yield Expectation(f"ANTNP of {name}", *figures, mean_of(results.reporting(Setting(name))).value)
+        yield Expectation(f"ANTNP of {name}", *figures, Measured.mean(results.reporting(Setting(name))).value)
     for name, quantity, value, tolerance in DEFAULTS:
         measure = {"mean": results.mean_m, "median": results.median_m, "rms": results.rms_m}[quantity]
         yield Expectation(f"{quantity} error [m] of {name}", value, tolerance, measure(Setting(name)).value)
@@ -84,10 +84,10 @@ def _sweeps(results: Results) -> Iterator[Expectation]:
                 setting = Setting(REPORTERS.get(what, what), **changes)
                 runs = results.reporting(setting) if what in REPORTERS else results.run_error_m(setting)
                 label = f"ANTNP, {what}" if what in REPORTERS else f"mean error [m] of {what}"
-                yield _with_doubt(f"{label}, {unit} = {value:g}", figure, mean_of(runs))
+                yield _with_doubt(f"{label}, {unit} = {value:g}", figure, Measured.mean(runs))
     for period_s, figure in OVER_PERIODS.items():
         runs = results.reporting(Setting("paper", period_s=period_s))
-        yield _with_doubt(f"ANTNP, boundary nodes, T = {period_s:g}", figure, mean_of(runs))
+        yield _with_doubt(f"ANTNP, boundary nodes, T = {period_s:g}", figure, Measured.mean(runs))
 
 
 def _readings(study: Study) -> Iterator[Expectation]:
@@ -98,5 +98,5 @@ def _readings(study: Study) -> Iterator[Expectation]:
     yield Expectation("rms error [m] with eqs. 12-13 as printed", PRINTED_RMS_M, 4.0, study.printed_rms_m().value)
 
 
-def _with_doubt(quantity: str, value: float, measured: Figure) -> Expectation:
+def _with_doubt(quantity: str, value: float, measured: Measured) -> Expectation:
     return Expectation(quantity, value, DOUBT * measured.stderr, measured.value)

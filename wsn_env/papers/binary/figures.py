@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wsn_env.envs.rendering.colours import BLACK, BLUE, GREEN, GREY, PURPLE, VERMILION
-from wsn_env.papers.binary.doubt import mean_of
+from wsn_env.evaluation.intervals import Measured
 from wsn_env.papers.binary.readings import transmitting_nodes
 from wsn_env.papers.binary.results import Results
 from wsn_env.papers.binary.systems import SWEPT, vary
@@ -83,8 +83,8 @@ def _draw_counts(axes: Axes, results: Results, name: str) -> None:
     fine = np.linspace(values[0], values[-1], 50)
     for system, (text, formula) in COUNTS.items():
         colour = LOOKS[system][1]["color"]
-        counts = [results.reporting(setting) for setting in vary(system, field, values)]
-        _draw_points(axes, values, np.array([mean_of(runs) for runs in counts]), label=text, color=colour, linestyle="")
+        counts = np.array([Measured.mean(results.reporting(setting)) for setting in vary(system, field, values)])
+        _draw_points(axes, values, counts, label=text, color=colour, linestyle="")
         lines = [transmitting_nodes(setting) for setting in vary(system, field, fine)]
         axes.plot(fine, lines, color=colour, linewidth=1.2, label=formula)
     axes.set(title="Transmitting nodes (ANTNP)", xlabel=label, ylabel="nodes a period")

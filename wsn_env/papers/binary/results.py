@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wsn_env.evaluation.intervals import Measured
 from wsn_env.evaluation.progress import Progress
-from wsn_env.papers.binary.doubt import Figure, bootstrap, mean_of
 from wsn_env.papers.binary.systems import FAULTS, PERIODS_S, RADII, SETTINGS, Setting
 from wsn_env.papers.rollout import Record, play_all, pooled_rms
 
@@ -27,18 +27,18 @@ class Results:
         """(R,) mean error of each run."""
         return self.error_m(setting).mean(axis=1)
 
-    def mean_m(self, setting: Setting) -> Figure:
+    def mean_m(self, setting: Setting) -> Measured:
         """Mean error."""
-        return mean_of(self.run_error_m(setting))
+        return Measured.mean(self.run_error_m(setting))
 
-    def median_m(self, setting: Setting) -> Figure:
+    def median_m(self, setting: Setting) -> Measured:
         """Median error over runs and periods."""
         error = self.error_m(setting)
-        return bootstrap(lambda runs: float(np.median(error[runs])), self.runs)
+        return Measured.bootstrap(lambda runs: float(np.median(error[runs])), self.runs)
 
-    def rms_m(self, setting: Setting) -> Figure:
+    def rms_m(self, setting: Setting) -> Measured:
         """Root of the mean square error over runs and periods."""
-        return Figure(*pooled_rms(self.error_m(setting) ** 2))
+        return pooled_rms(self.error_m(setting) ** 2)
 
     def reporting(self, setting: Setting) -> np.ndarray:
         """(R,) mean number of nodes that report in a period (ANTNP) of each run."""
@@ -48,7 +48,7 @@ class Results:
         """(R,) mean energy of a period of each run."""
         return self.records[setting].energy_mj[:, setting.steady].mean(axis=1)
 
-    def crossing_s(self, system: str) -> Figure:
+    def crossing_s(self, system: str) -> Measured:
         """The sampling period from which the centroid has the lower RMS; NaN: none up to the longest."""
         settings = [[Setting(name, period_s=t) for t in PERIODS_S] for name in (system, "centroid")]
         squares = [np.stack([(self.error_m(one) ** 2).mean(axis=1) for one in row]) for row in settings]
@@ -57,14 +57,14 @@ class Results:
             own, other = (np.sqrt(square[:, runs].mean(axis=1)) for square in squares)
             return first_crossing(own - other)
 
-        return bootstrap(crossing, self.runs)
+        return Measured.bootstrap(crossing, self.runs)
 
-    def even_s(self) -> Figure:
+    def even_s(self) -> Measured:
         """The sampling period from which more nodes change their state than detect; NaN: none."""
         own, other = (
             np.stack([self.reporting(Setting(name, period_s=t)) for t in PERIODS_S]) for name in ("paper", "centroid")
         )
-        return bootstrap(lambda runs: first_crossing((own - other)[:, runs].mean(axis=1)), self.runs)
+        return Measured.bootstrap(lambda runs: first_crossing((own - other)[:, runs].mean(axis=1)), self.runs)
 
 
 def first_crossing(excess: np.ndarray) -> float:

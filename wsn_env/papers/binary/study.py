@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from wsn_env.papers.binary.doubt import Figure
+from wsn_env.evaluation.intervals import Measured, standard_error
 from wsn_env.papers.binary.readings import Snapshots, along, compare_readings, follow_as_printed, take_snapshots
 from wsn_env.papers.binary.results import Results
-from wsn_env.papers.rollout import pooled_rms, standard_error
+from wsn_env.papers.rollout import pooled_rms
 
 
 class Study:
@@ -19,17 +19,17 @@ class Study:
         self.offsets: dict[str, list[np.ndarray]] = compare_readings(snapshots)
         self.printed_m: np.ndarray = follow_as_printed(snapshots)
 
-    def rms_m(self, reading: str) -> Figure:
+    def rms_m(self, reading: str) -> Measured:
         """RMS of a reading's fixes [m]."""
         squares = [(offsets**2).sum(axis=1) for offsets in self.offsets[reading]]
         rms = float(np.sqrt(np.concatenate(squares).mean()))
-        return Figure(rms, standard_error(np.array([square.mean() for square in squares])) / (2 * rms))
+        return Measured(rms, standard_error(np.array([square.mean() for square in squares])) / (2 * rms))
 
-    def bias_m(self, reading: str) -> Figure:
+    def bias_m(self, reading: str) -> Measured:
         """Mean offset along the velocity [m]."""
         runs = [along(offsets) for offsets in self.offsets[reading]]
-        return Figure(float(np.concatenate(runs).mean()), standard_error(np.array([run.mean() for run in runs])))
+        return Measured(float(np.concatenate(runs).mean()), standard_error(np.array([run.mean() for run in runs])))
 
-    def printed_rms_m(self) -> Figure:
+    def printed_rms_m(self) -> Measured:
         """RMS of the recursion as printed [m]."""
-        return Figure(*pooled_rms(self.printed_m**2))
+        return pooled_rms(self.printed_m**2)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wsn_env.papers.binary.doubt import Figure, mean_of
+from wsn_env.evaluation.intervals import Measured
 from wsn_env.papers.binary.expected import (
     ANTNP,
     DEFAULTS,
@@ -78,7 +78,7 @@ def systems(results: Results) -> Sheet:
         cells: list[Any] = [f"{name}: {MEANINGS[name]}"]
         for quantity, measure in measures.items():
             cells += [known.get((name, quantity)), *measure(Setting(name))]
-        counts, energy = mean_of(results.reporting(Setting(name))), mean_of(results.energy_mj(Setting(name)))
+        counts, energy = (Measured.mean(of(Setting(name))) for of in (results.reporting, results.energy_mj))
         rows.append((*cells, ANTNP["centroid" if name.startswith("centroid") else "paper"][0], *counts, *energy))
     return Sheet((*columns, "energy mJ a period", "stderr"), rows)
 
@@ -109,7 +109,7 @@ def counts(results: Results, name: str) -> Sheet:
             cells.append(EXPECTED[name][kind])
         columns += [kind, "stderr", f"{kind}, closed form"]
         settings = vary(system, field, values)
-        cells += zip(*(mean_of(results.reporting(setting)) for setting in settings), strict=True)
+        cells += zip(*(Measured.mean(results.reporting(setting)) for setting in settings), strict=True)
         cells.append([transmitting_nodes(setting) for setting in settings])
     return Sheet(tuple(columns), list(zip(*cells, strict=True)))
 
@@ -156,7 +156,7 @@ def faults(results: Results) -> Sheet:
     rows = []
     for label, fault in cases:
         setting = Setting("paper", **fault)
-        cost = *mean_of(results.reporting(setting)), *mean_of(results.energy_mj(setting))
+        cost = *Measured.mean(results.reporting(setting)), *Measured.mean(results.energy_mj(setting))
         rows.append((label, *_mean_errors(results, FAULTED, fault), *cost))
     return Sheet(("fault", *columns), rows)
 
@@ -197,5 +197,5 @@ def _mean_errors(
     return cells
 
 
-def _or_none(figure: Figure) -> tuple[float | None, ...]:
+def _or_none(figure: Measured) -> tuple[float | None, ...]:
     return tuple(value if np.isfinite(value) else None for value in figure)

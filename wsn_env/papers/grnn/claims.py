@@ -9,11 +9,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from wsn_env.evaluation.intervals import Measured
 from wsn_env.papers.claim import Claim, Expectation, judge_claim
 from wsn_env.papers.grnn.comparison import LAST, PAIRS
 from wsn_env.papers.grnn.flies import FLIES, FLIES_IN_M, GOLDEN, PAN, Search
 from wsn_env.papers.grnn.systems import ANCHORS, COMPARED_S, FILTERS, METHODS, PERIODS_S, Results
-from wsn_env.papers.rollout import Record, exceeds, pooled_rms, standard_error
+from wsn_env.papers.rollout import Record, exceeds, pooled_rms
 
 LONGER = slice(1, None)  # of PERIODS_S, those of .2 s and more
 EXPECTED_RMSE_M = {  # from an independent implementation of our reading, at T = .1, .2, .5, 1 s
@@ -97,14 +98,14 @@ def judge_claims(results: Results, searches: list[Search]) -> list[Claim]:
 
 def excess(ours: np.ndarray, theirs: np.ndarray) -> tuple[float, float]:
     """By what share their RMSE exceeds ours, and its standard error, from the runs' mean square errors (R,); paired."""
-    ratio = float(np.sqrt(theirs.mean() / ours.mean()))
-    return ratio - 1, standard_error(theirs - ratio**2 * ours) / (2 * ratio * float(ours.mean()))
+    ratio = Measured.root_ratio(theirs, ours)
+    return ratio.value - 1, ratio.stderr
 
 
 def mean_excess(ours: np.ndarray, theirs: np.ndarray) -> tuple[float, float]:
     """The same of the mean error, from that of the runs (R,)."""
-    ratio = float(theirs.mean() / ours.mean())
-    return ratio - 1, standard_error(theirs - ratio * ours) / float(ours.mean())
+    ratio = Measured.ratio(theirs, ours)
+    return ratio.value - 1, ratio.stderr
 
 
 def _run_mean(record: Record) -> np.ndarray:

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from wsn_env.evaluation.intervals import standard_error
 from wsn_env.filters.fingerprint import training_of
 from wsn_env.papers.grnn.fixes import REFERENCES, USUAL_K, best_k, by_fingerprints, by_network, least_squares
 from wsn_env.papers.grnn.strengths import Heard, filter_walk, likely_walk
 from wsn_env.papers.grnn.systems import COMPARED_S, METHODS, Results, scenario_as_read
-from wsn_env.papers.rollout import pooled_rms, standard_error
+from wsn_env.papers.rollout import pooled_rms
 from wsn_env.papers.sheet import Sheet
 
 SHARES = (0.5, 0.9)  # of all periods of all runs

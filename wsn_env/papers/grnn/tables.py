@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wsn_env.evaluation.intervals import standard_error
 from wsn_env.filters.fingerprint import training_of
 from wsn_env.papers.grnn.claims import EXPECTED_RMSE_M, excess
 from wsn_env.papers.grnn.comparison import SMOOTHED, UNAIDED
@@ -24,7 +25,7 @@ from wsn_env.papers.grnn.systems import (
     Results,
     scenario_as_read,
 )
-from wsn_env.papers.rollout import Record, pooled_rms, standard_error
+from wsn_env.papers.rollout import Record, pooled_rms
 from wsn_env.papers.sheet import Sheet, show_table
 
 START_NAMES = {"field": "the field's middle", "fix": "the network's fix"}

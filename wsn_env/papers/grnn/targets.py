@@ -11,11 +11,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from wsn_env.evaluation.intervals import standard_error
 from wsn_env.evaluation.policies import make_policy
 from wsn_env.evaluation.rollout import FIRST_SEED, episodes
 from wsn_env.models.motion.free import Free
 from wsn_env.papers.grnn.systems import DENSITY, METHODS, scenario_as_read
-from wsn_env.papers.rollout import standard_error
 from wsn_env.papers.sheet import Sheet
 from wsn_env.simulation.world import World
 

@@ -10,14 +10,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from wsn_env.evaluation.intervals import Measured
 from wsn_env.papers.claim import Claim, judge_claim
 from wsn_env.papers.pre_dc.expected import PAPER_RMS_M
 from wsn_env.papers.pre_dc.measures import (
     STATIC_ENERGY,
-    mean_and_error,
     periods_tracked,
     quarters,
-    ratio,
     sd_over_periods_m,
     static_energy_mj,
     system_sd_m,
@@ -51,7 +50,7 @@ def judge_claims(results: Results) -> list[Claim]:
 
 
 def _shown(values: np.ndarray) -> str:
-    mean, error = mean_and_error(values)
+    mean, error = Measured.mean(values)
     return f"{mean:.3f} ({error:.3f})"
 
 
@@ -133,7 +132,7 @@ def _energy(results: Results) -> Claim:
 def _energy_share(results: Results) -> Claim:
     """Of static's reports alone and of the static cluster's with the same tracker, at 225 nodes and at fewer."""
     shares = {
-        (reading, nodes): ratio(
+        (reading, nodes): Measured.ratio(
             results.system("pre_dc", nodes).energy_mj.mean(axis=1), static_energy_mj(results, reading, nodes)
         )
         for reading in ("reports", "cluster")
@@ -157,7 +156,7 @@ def _energy_share(results: Results) -> Claim:
 def _lifetime(results: Results) -> Claim:
     periods = {policy: periods_tracked(results.lifetime(policy)) for policy in LIFETIME_POLICIES}
     longer = exceeds(periods["pre_dc"], periods["static_cluster"])
-    figures = {policy: mean_and_error(counts) for policy, counts in periods.items()}
+    figures = {policy: Measured.mean(counts) for policy, counts in periods.items()}
     ours = ", ".join(f"{policy} {mean:.0f} ({error:.0f})" for policy, (mean, error) in figures.items())
     ours += " periods until the target is lost for good, with batteries of 1 mJ"
     what = "the network lasts longer with Pre-DC than with static-cluster"

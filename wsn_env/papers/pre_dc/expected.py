@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from wsn_env.evaluation.intervals import Measured
 from wsn_env.papers.claim import Expectation
-from wsn_env.papers.pre_dc.measures import ratio, static_energy_mj
+from wsn_env.papers.pre_dc.measures import static_energy_mj
 from wsn_env.papers.pre_dc.systems import NODES, Results
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.sensing import detection_probability, joint_detection_probability
@@ -43,7 +44,7 @@ def list_expectations(results: Results) -> list[Expectation]:
     figures.append(Expectation("RMS [m] of pre_dc at 225 nodes with Phi0 alone", 1.35, EXPECTED_SHARE * 1.35, rms))
     for (reading, nodes), times in EXPECTED_TIMES.items():
         static, pre_dc = static_energy_mj(results, reading, nodes), results.system("pre_dc", nodes).energy_mj
-        measured, _ = ratio(static, pre_dc.mean(axis=1))
+        measured, _ = Measured.ratio(static, pre_dc.mean(axis=1))
         figures.append(Expectation("energy of static_cluster over pre_dc's, same tracker", times, times / 4, measured))
     for label, cells, share in (("our reading", EXPECTED_RMS_M, EXPECTED_SHARE), ("paper", PAPER_RMS_M, PAPER_SHARE)):
         for (name, nodes), rms in cells.items():

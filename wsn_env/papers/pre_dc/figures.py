@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wsn_env.envs.rendering.colours import BLACK, BLUE, DARK, GREEN, GREY, VERMILION
+from wsn_env.evaluation.intervals import standard_error
 from wsn_env.models.detection.radius import Detection
 from wsn_env.papers.pre_dc.cluster import draw_cluster, list_cluster, play_until
 from wsn_env.papers.pre_dc.flow_chart import draw_flow_chart
 from wsn_env.papers.pre_dc.systems import MOTIONS, PARTICLES, SYSTEMS, Results
-from wsn_env.papers.rollout import standard_error
 from wsn_env.papers.sheet import Sheet, by_period, new_axes, tidy, write_sheet
 from wsn_env.reports.pictures import write_picture
 from wsn_env.scenario import Scenario

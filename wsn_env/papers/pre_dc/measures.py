@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from wsn_env.evaluation.intervals import Measured
 from wsn_env.papers.pre_dc.systems import SYSTEMS, Results
-from wsn_env.papers.rollout import Record, pooled_rms, standard_error
+from wsn_env.papers.rollout import Record, pooled_rms
 
 WINDOW, LOST_M = 50, 10.0  # a network fails when the mean error of so many periods exceeds the sensing radius
 
@@ -16,21 +17,10 @@ STATIC_ENERGY = {  # how the static system's energy is read
 }
 
 
-def mean_and_error(values: np.ndarray) -> tuple[float, float]:
-    """Mean over runs and its standard error."""
-    return float(values.mean()), standard_error(values)
-
-
 def difference(larger: np.ndarray, smaller: np.ndarray) -> tuple[float, float]:
     """Paired: mean over the same runs and its standard error, to a tenth of a millimetre [m]."""
-    mean, error = mean_and_error(larger - smaller)
+    mean, error = Measured.mean(larger - smaller)
     return round(mean, 4), round(error, 4)
-
-
-def ratio(over: np.ndarray, under: np.ndarray) -> tuple[float, float]:
-    """Ratio of the means over the same runs, and its standard error (by the delta method)."""
-    share = float(over.mean() / under.mean())
-    return share, standard_error(over - share * under) / float(under.mean())
 
 
 def quarters(record: Record) -> list[tuple[float, float]]:

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from wsn_env.evaluation.intervals import Measured, standard_error
 from wsn_env.papers.pre_dc.expected import EXPECTED_TIMES, PAPER_RMS_M
 from wsn_env.papers.pre_dc.measures import (
     STATIC_ENERGY,
     difference,
-    mean_and_error,
     periods_tracked,
     quarters,
-    ratio,
     sd_over_periods_m,
     static_energy_mj,
     system_sd_m,
@@ -27,7 +26,6 @@ from wsn_env.papers.pre_dc.systems import (
     Results,
     motion_trial,
 )
-from wsn_env.papers.rollout import standard_error
 from wsn_env.papers.sheet import Sheet, show_sheet, show_table, write_sheet
 
 TITLES = {
@@ -89,7 +87,7 @@ def same_tracker(results: Results) -> Sheet:
     records = {policy: results.same_tracker(policy) for policy in SAME_TRACKER}
     records["pre_dc with Φ0 alone"] = results.as_printed()
     rows = [
-        (policy, *mean_and_error(record.rms_m()), *mean_and_error(record.energy_mj.mean(axis=1)))
+        (policy, *Measured.mean(record.rms_m()), *Measured.mean(record.energy_mj.mean(axis=1)))
         for policy, record in records.items()
     ]
     return Sheet(("policy", "RMS m", "stderr m", "energy mJ a period", "stderr mJ"), rows)
@@ -102,9 +100,10 @@ def energy(results: Results) -> Sheet:
         for nodes in NODES:
             static = static_energy_mj(results, reading, nodes)
             pre_dc = results.system("pre_dc", nodes).energy_mj.mean(axis=1)
-            share, error = ratio(100 * pre_dc, static)
+            share, error = Measured.ratio(100 * pre_dc, static)
             expected = EXPECTED_TIMES.get((reading, nodes))
-            figures = *mean_and_error(static), *mean_and_error(pre_dc), share, error, *ratio(static, pre_dc), expected
+            means = *Measured.mean(static), *Measured.mean(pre_dc)
+            figures = *means, share, error, *Measured.ratio(static, pre_dc), expected
             rows.append((f"{title}, {nodes} nodes", *figures))
     columns = ("static mJ a period", "stderr", "Pre-DC mJ a period", "stderr", "Pre-DC's share %", "stderr")
     return Sheet(("static's energy", *columns, "static / Pre-DC", "stderr", "expected"), rows)
@@ -117,7 +116,7 @@ def systems(results: Results) -> Sheet:
     cluster = results.same_tracker("static_cluster")
     spreads["static cluster, one tracker"] = sd_over_periods_m(cluster), cluster
     rows = [
-        (title, *mean_and_error(spread), *mean_and_error(record.energy_mj.mean(axis=1)))
+        (title, *Measured.mean(spread), *Measured.mean(record.energy_mj.mean(axis=1)))
         for title, (spread, record) in spreads.items()
     ]
     columns = ("sd of the error over the periods m", "stderr m", "energy mJ a period", "stderr mJ")
@@ -143,7 +142,7 @@ def particles(results: Results) -> Sheet:
     rows = []
     for count in PARTICLES:
         record = results.particles(count)
-        x, y = (mean_and_error(record.axis_rms_m(axis)) for axis in (0, 1))
+        x, y = (Measured.mean(record.axis_rms_m(axis)) for axis in (0, 1))
         rows.append((count, *x, *y, *difference(record.rms_m(), best)))
     columns = ("RMS in x m", "stderr m", "RMS in y m", "stderr m", "excess over 5000 particles m", "stderr m")
     return Sheet(("particles", *columns), rows)
@@ -151,7 +150,7 @@ def particles(results: Results) -> Sheet:
 
 def lifetime(results: Results) -> Sheet:
     """How long a network with small batteries follows the target."""
-    rows = [(policy, *mean_and_error(periods_tracked(results.lifetime(policy)))) for policy in LIFETIME_POLICIES]
+    rows = [(policy, *Measured.mean(periods_tracked(results.lifetime(policy)))) for policy in LIFETIME_POLICIES]
     return Sheet(("policy", "periods", "stderr"), rows)
 
 

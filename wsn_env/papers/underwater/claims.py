@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from wsn_env.evaluation.intervals import standard_error
 from wsn_env.papers.claim import Claim, judge_claim
-from wsn_env.papers.rollout import Record, exceeds, standard_error
+from wsn_env.papers.rollout import Record, exceeds
 from wsn_env.papers.underwater.expected import HARMLESS, KEEPS, LOSES, rmse_ratio
 from wsn_env.papers.underwater.systems import (
     HANDOVERS,

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from wsn_env.evaluation.intervals import standard_error
 from wsn_env.models.acoustics import absorption_db_per_km, ambient_noise_db
 from wsn_env.models.state import PURPOSES
-from wsn_env.papers.rollout import Record, pooled_rms, standard_error
+from wsn_env.papers.rollout import Record, pooled_rms
 from wsn_env.papers.sheet import Sheet, by_period
 from wsn_env.papers.underwater.systems import (
     HANDOVERS,
