@@ -10,10 +10,8 @@ from __future__ import annotations
 import json
 import sys
 import time
-from dataclasses import asdict, dataclass, field, is_dataclass
-from hashlib import sha256
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from shutil import rmtree
 from typing import Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -29,19 +27,19 @@ from wsn_env.envs.interface import Settings
 from wsn_env.envs.observations import ObservationName
 from wsn_env.envs.vector_env import ClusterVectorEnv
 from wsn_env.evaluation.comparison import evaluate
-from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.kept_blocks import remove_kept_blocks
 from wsn_env.evaluation.policies import Policy, make_policy, policy_names
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.evaluation.rollout import FIRST_SEED, evaluation_seeds
-from wsn_env.evaluation.versions import sources_digest, versions
+from wsn_env.evaluation.versions import versions
 from wsn_env.learning.actor_critic import EntryPolicy, actor_network, entry_sizes
-from wsn_env.learning.checkpoints import CHECKPOINT, OLD_CHECKPOINT, Watch, load_checkpoint
+from wsn_env.learning.checkpoints import Watch, load_checkpoint
 from wsn_env.learning.concat_vector_env import ConcatVectorEnv
 from wsn_env.learning.defaults import default_level, default_node_counts, default_order
 from wsn_env.learning.levelling import LevelledRollout
 from wsn_env.learning.network import PolicyNetwork
 from wsn_env.learning.replayable import ReplayableRows
+from wsn_env.learning.run_folder import facts_of, open_folder, open_progress
 from wsn_env.learning.sb3 import SB3VecEnv
 from wsn_env.learning.training_reward import TrainingReward
 from wsn_env.models.measurement.base import Order
@@ -54,8 +52,6 @@ from wsn_env.scenario import Scenario
 
 SIZED = ("nearest", "informed")  # compared with each of SIZES
 SIZES = range(9)  # further members
-FREE = ("runs", "episodes", "evaluation_seed", "checkpoint_steps", "address")  # may change in a resumed run
-BEGUN = (CHECKPOINT, OLD_CHECKPOINT, "ray.safetensors", "ray", "policy.json")  # any of them shows that a run was begun
 SLOW = ("ppo", "planner")  # left out of the comparison: the one trained is in it, the other takes hours
 
 
@@ -172,11 +168,12 @@ def train(settings: Training) -> None:
     observation: ObservationName = "menu" if settings.action == "menu" else "candidates"
     order = settings.order or default_order(scenario)
     interface = Settings(settings.action, observation, settings.reward, order)
-    folder = open_folder(settings)
+    folder, values = settings.folder, settings_as_json(settings)
+    open_folder(folder, values, settings.resume)
     learn = learn_on_ray if settings.engine == "ray" else learn_locally
     network = learn(settings, scenario, interface, folder)
 
-    made = {name: value for name, value in settings_as_json(settings).items() if name not in ("name", "runs")}
+    made = {name: value for name, value in values.items() if name not in ("name", "runs")}
     facts = {"training": made, "scenario": scenario.as_dict(), "versions": versions()}
     policy = save_policy(folder, network, interface, facts)
     print(f"saved: {policy}")
@@ -210,7 +207,7 @@ def learn_locally(settings: Training, scenario: Scenario, interface: Settings, f
     """stable-baselines3's PPO."""
     envs = SB3VecEnv(make_envs(settings, scenario, interface, settings.rows), stagger=True)
     model = make_model(settings, ReplayableRows(envs))
-    facts = facts_of(settings, scenario)
+    facts = facts_of(settings_as_json(settings), scenario, Path(__file__))
     pending = load_checkpoint(model, folder, settings.steps, facts)
     left = settings.steps - model.num_timesteps
     if left > 0:
@@ -246,7 +243,7 @@ def learn_on_ray(settings: Training, scenario: Scenario, interface: Settings, fo
         entry_sizes(settings.action, whole.single_observation_space, settings.units, settings.critic),
         folder,
         steps=settings.steps,
-        facts=facts_of(settings, scenario),
+        facts=facts_of(settings_as_json(settings), scenario, Path(__file__)),
         rows=settings.rows,
         runners=settings.runners,
         rollout=settings.rollout,
@@ -307,68 +304,6 @@ def check_settings(settings: Training) -> None:
     check_quantity("train.py", "seed", settings.seed, at_least=0, at_most=most, whole=True)
     if settings.episodes:
         evaluation_seeds(settings.evaluation_seed, settings.episodes)
-
-
-def open_folder(settings: Training) -> Path:
-    """The run's folder with config.json; an existing run is only touched by --resume, with the same settings."""
-    folder = settings.folder
-    path = folder / "config.json"
-    begun = any((folder / name).exists() for name in BEGUN)
-    if begun:
-        if not settings.resume:
-            raise ValueError(f"{folder} exists: --resume continues it, --name begins another, or remove it")
-        old, new = read_config(path), settings_as_json(settings)
-        differing = [name for name in new if name not in FREE and old.get(name) != new[name]]
-        if differing:
-            name = differing[0]
-            raise ValueError(f"{folder} was begun with {name} = {old.get(name)!r}: cannot resume it with {new[name]!r}")
-    folder.mkdir(parents=True, exist_ok=True)
-    with replacing(path) as temporary:
-        temporary.write_text(json.dumps(settings_as_json(settings), indent=1))
-    return folder
-
-
-def read_config(path: Path) -> dict:
-    """The settings that a run was begun with."""
-    try:
-        old = json.loads(path.read_text()) if path.is_file() else None
-    except (ValueError, RecursionError):
-        old = None
-    if not isinstance(old, dict):
-        state = "is damaged" if path.exists() else "is missing"
-        raise ValueError(f"{path} {state}: nobody knows the run's settings; --name begins another, or remove the run")
-    return old
-
-
-def facts_of(settings: Training, scenario: Scenario) -> dict[str, dict]:
-    """What a training must share with the checkpoint that it goes on from."""
-    decisive = {name: value for name, value in settings_as_json(settings).items() if name not in (*FREE, "name")}
-    kinds = {type(part).__module__ for part in vars(scenario).values() if is_dataclass(part)}
-    own = [sys.modules[kind].__file__ for kind in kinds if not kind.startswith("wsn_env.")]
-    files = [Path(file) for file in (*own, *settings.tracks) if file]
-    contents = {str(file): digest_of(file) for file in files}
-    sources = versions() | {"sources of wsn_env": sources_digest()[:16], "train.py": digest_of(Path(__file__))}
-    world = json.loads(json.dumps(scenario.as_dict(), default=str))
-    quantities: dict = {}
-    for part, value in world.items():
-        quantities |= (
-            {f"{part}.{name}": one for name, one in value.items()} if isinstance(value, dict) else {part: value}
-        )
-    return {"setting": decisive, "quantity": quantities, "file": contents, "version": sources}
-
-
-def digest_of(file: Path) -> str:
-    """Short, of what it holds."""
-    return sha256(file.read_bytes()).hexdigest()[:16]
-
-
-def open_progress(folder: Path, periods: int) -> Path:
-    """Where to log from so many periods on; what was logged there and beyond by one that was stopped is removed."""
-    for path in folder.glob("progress-*"):
-        begin = path.name.removeprefix("progress-")
-        if begin.isdecimal() and int(begin) >= periods:
-            rmtree(path)
-    return folder / f"progress-{periods}"
 
 
 def settings_as_json(settings: Training) -> dict:

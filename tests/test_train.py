@@ -38,7 +38,9 @@ def make_model(settings):
     scenario = train.complete_settings(settings)
     interface = train.Settings(settings.action, "menu", settings.reward, settings.order)
     envs = train.SB3VecEnv(train.make_envs(settings, scenario, interface, settings.rows), stagger=True)
-    return train.make_model(settings, train.ReplayableRows(envs)), train.facts_of(settings, scenario)
+    return train.make_model(settings, train.ReplayableRows(envs)), train.facts_of(
+        train.settings_as_json(settings), scenario, Path(train.__file__)
+    )
 
 
 def train_until(monkeypatch, periods, **settings):
