@@ -11,6 +11,7 @@ from studies.report import draw_curves, learning_curve, over_seeds, table
 from tests.figures import check_tables
 from wsn_env import Scenario
 from wsn_env.agents.ppo import PRETRAINED
+from wsn_env.scenario import named_scenarios
 
 SMALL = "particles=50 nodes=40 side_m=50 crossing_m=20 periods=10".split()
 
@@ -94,6 +95,11 @@ def test_the_pages_small_tables_are_what_is_measured(tmp_path):
     tables.main(["--episodes", "40", "--only", *names, "--out", str(tmp_path)])
     check_tables("environment.md", "tables", tmp_path, share=0.1)
     check_tables("results.md", "tables", tmp_path, share=0.1)
+
+
+def test_every_scenario_and_shipped_policy_is_in_a_table():
+    assert set(tables.COSTLY) == set(named_scenarios())
+    assert {f"shipped_{path.parent.name}" for path in PRETRAINED.glob("*/policy.json")} <= set(tables.TABLES)
 
 
 def test_an_unknown_table_is_named(capsys):
