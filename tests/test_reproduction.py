@@ -17,7 +17,7 @@ from wsn_env.papers.pre_dc.claims import pre_dc_is_best
 from wsn_env.papers.pre_dc.cluster import play_until
 from wsn_env.papers.pre_dc.coverage import COVERAGE
 from wsn_env.papers.pre_dc.expected import EXPECTED_RMS_M, PAPER_RMS_M
-from wsn_env.papers.pre_dc.measures import LOST_M, WINDOW, periods_tracked, ratio, sd_over_periods_m
+from wsn_env.papers.pre_dc.measures import LOST_M, WINDOW, periods_tracked, sd_over_periods_m
 from wsn_env.papers.pre_dc.systems import NODES, SYSTEMS, motion_trial, scenario_as_read
 from wsn_env.papers.rollout import Trial, exceeds, play, play_all
 from wsn_env.papers.sheet import show_table
@@ -190,14 +190,6 @@ def test_a_network_fails_when_the_mean_of_its_errors_does():
     error[1, 30] = 100 * LOST_M  # a single period, before a window has passed
     record = SimpleNamespace(square_error=lambda: error**2)
     assert periods_tracked(record).tolist() == [100 + WINDOW // 2 + 1, WINDOW, 200]
-
-
-def test_a_ratio_and_its_error():
-    rng = np.random.default_rng(1)
-    under = rng.uniform(1, 2, 400)
-    assert ratio(3 * under, under) == pytest.approx((3, 0), abs=1e-12)  # paired: no doubt is left
-    draws = [ratio(rng.normal(6, 1, 100), rng.normal(2, 0.2, 100)) for _ in range(400)]
-    assert np.std([share for share, _ in draws]) == pytest.approx(np.mean([error for _, error in draws]), rel=0.15)
 
 
 def test_steadiness_is_within_a_run():

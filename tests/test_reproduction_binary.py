@@ -11,7 +11,6 @@ from tests.figures import check_tables
 from wsn_env.evaluation.intervals import standard_error
 from wsn_env.papers import reproduce
 from wsn_env.papers.binary.coverage import COVERAGE
-from wsn_env.papers.binary.doubt import bootstrap
 from wsn_env.papers.binary.energy import judge_energy
 from wsn_env.papers.binary.expected import DEFAULTS, SHIFT_BIAS_M
 from wsn_env.papers.binary.readings import PAIRS, boundary_nodes, detecting_nodes, even_period_s, lens_m2
@@ -168,12 +167,6 @@ def test_a_crossing_is_interpolated_or_there_is_none():
     excess = np.array([-2.0, -1.0, -1.0, 3.0, 1.0, 1.0, 1.0, 1.0, 1.0])
     assert first_crossing(excess) == pytest.approx(2.125)
     assert np.isnan(first_crossing(abs(excess))) and np.isnan(first_crossing(-abs(excess)))
-
-
-def test_the_bootstrap_finds_the_error_of_a_mean():
-    values = np.random.default_rng(1).normal(size=400)
-    found = bootstrap(lambda runs: values[runs].mean(), 400)
-    assert found.value == values.mean() and found.stderr == pytest.approx(standard_error(values), rel=0.2)
 
 
 def test_unequal_radii_mislead_who_does_not_know_them():

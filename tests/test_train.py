@@ -17,6 +17,8 @@ import train
 from wsn_env import ClusterVectorEnv, Scenario, View, evaluate, make_policy
 from wsn_env.agents.ppo import PPOPolicy
 from wsn_env.cli import parse_overrides
+from wsn_env.evaluation.versions import versions
+from wsn_env.learning import run_folder
 from wsn_env.learning.actor_critic import actor_network
 from wsn_env.learning.checkpoint_file import pack, read_checkpoint, unpack, write_checkpoint
 from wsn_env.learning.network import EntryNetwork, PolicyNetwork
@@ -251,14 +253,14 @@ def test_a_checkpoint_that_cannot_be_is_refused(run, tmp_path, change):
 def test_a_checkpoint_of_other_code_or_settings_is_refused(run, tmp_path, monkeypatch):
     shutil.copytree(run, tmp_path / "short")
     path = tmp_path / "short" / "checkpoint.safetensors"
-    now = train.versions()
+    now = versions()
     for name, value in (("torch", "1.0"), ("wsn_env", "0.0.1"), ("python", "3.99.0")):
         with monkeypatch.context() as patch:
-            patch.setattr(train, "versions", lambda: now | {name: value})  # noqa: B023
+            patch.setattr(run_folder, "versions", lambda: now | {name: value})  # noqa: B023
             wanted = f"{path} was written with version {name} = {now[name]}, and now it is {value}: go back"
             assert resume(tmp_path).startswith(wanted)
     with monkeypatch.context() as patch:
-        patch.setattr(train, "sources_digest", lambda: "0" * 64)
+        patch.setattr(run_folder, "sources_digest", lambda: "0" * 64)
         assert "version sources of wsn_env" in resume(tmp_path)
     with monkeypatch.context() as patch:
         preset = Scenario.named("PreDC-v0", decay_power=2.5)
