@@ -38,11 +38,13 @@ from wsn_env.learning.actor_critic import EntryPolicy, actor_network, entry_size
 from wsn_env.learning.checkpoints import CHECKPOINT, Watch, load_checkpoint, save_checkpoint
 from wsn_env.learning.concat_vector_env import ConcatVectorEnv
 from wsn_env.learning.defaults import default_level, default_node_counts, default_order
+from wsn_env.learning.divergence import StopDiverged, check_finite, is_finite
 from wsn_env.learning.levelling import LevelledRollout
 from wsn_env.learning.network import PolicyNetwork
 from wsn_env.learning.sb3 import SB3VecEnv
 from wsn_env.learning.training_reward import TrainingReward
 from wsn_env.models.measurement.base import Order
+from wsn_env.models.own import own_error, own_place
 from wsn_env.models.quantity import check_quantity, parse_overrides
 from wsn_env.reports.pages.evaluation_page import write_report
 from wsn_env.reports.pictures import write_picture
@@ -151,7 +153,12 @@ def main() -> int:
     try:
         train(settings)
     except (ValueError, OSError, MemoryError) as problem:
-        print(f"train.py: {problem}", file=sys.stderr)
+        print(f"train.py: {own_place(problem)}{problem}", file=sys.stderr)
+        return 2
+    except Exception as problem:
+        if not own_place(problem):
+            raise
+        print(f"train.py: {own_error(problem)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print(f"train.py: stopped; the same command with --resume continues {settings.folder}", file=sys.stderr)
@@ -213,9 +220,13 @@ def learn_locally(settings: Training, scenario: Scenario, interface: Settings, f
         with progress_bar() as report:
             callback = Watch(folder, settings.steps, settings.checkpoint_steps, report)
             try:
-                model.learn(left, callback=callback, reset_num_timesteps=False)
+                model.learn(left, callback=[callback, StopDiverged()], reset_num_timesteps=False)
+            except (ValueError, RuntimeError):
+                check_finite(model)  # torch's own words about NaN fill a screen
+                raise
             finally:
-                save_checkpoint(model, folder)
+                if is_finite(model):
+                    save_checkpoint(model, folder)
         seconds = time.perf_counter() - started
         print(
             f"trained {left:,} periods in {seconds:.0f} s ({left / seconds:,.0f} a second), "
@@ -273,11 +284,15 @@ def check_settings(settings: Training) -> None:
     """Refuse now what would fail after the training."""
     for name in "steps rows rollout batch epochs torch_threads checkpoint_steps".split():
         check_quantity("train.py", name, getattr(settings, name), at_least=1, whole=True)
+    check_quantity("train.py", "batch", settings.batch, at_least=2)  # advantages are normalised by its sd
     for name in ("gamma", "gae_lambda", "level"):
         check_quantity("train.py", name, getattr(settings, name), at_least=0, at_most=1)
+    check_quantity("train.py", "learning_rate", settings.learning_rate, above=0, at_most=1)
+    check_quantity("train.py", "entropy", settings.entropy, at_least=0, at_most=100)
     for name in ("units", "critic"):
         for units in getattr(settings, name):
-            check_quantity("train.py", name, units, at_least=1, whole=True)
+            check_quantity("train.py", name, units, at_least=1, at_most=4096, whole=True)
+    check_quantity("train.py", "torch_threads", settings.torch_threads, at_least=1, at_most=1024)
     for name, hint in get_type_hints(Training).items():
         if get_origin(hint) is Literal and getattr(settings, name) not in get_args(hint):
             allowed = ", ".join(get_args(hint))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import time
-import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from wsn_env.evaluation.progress import progress_bar
+from wsn_env.models.own import own_error, own_place
 from wsn_env.models.quantity import parse_overrides
 from wsn_env.scenario import Scenario
 
@@ -115,28 +115,18 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         runs[type(command)](command)
     except (ValueError, OSError, MemoryError) as problem:
-        print(f"wsn: {user_code_location(problem)}{problem}", file=sys.stderr)
+        print(f"wsn: {own_place(problem)}{problem}", file=sys.stderr)
+        return 2
+    except Exception as problem:
+        if not own_place(problem):
+            raise
+        print(f"wsn: {own_error(problem)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         kept = isinstance(command, Evaluate) and command.out
         print("wsn: stopped" + ("; the same command continues where it was" if kept else ""), file=sys.stderr)
         return 130
     return 0
-
-
-def user_code_location(problem: Exception) -> str:
-    """Where it arose, if that is in a file of the user's own: "mine.py:12: "."""
-    others: list[str | Path] = [
-        Path(__file__).parents[1] / "wsn_env",
-        Path(__file__).parents[1] / "agents",
-        sys.prefix,
-        sys.base_prefix,
-    ]
-    for frame in reversed(traceback.extract_tb(problem.__traceback__)):
-        path = Path(frame.filename)
-        if path.is_file() and not any(path.is_relative_to(folder) for folder in others):
-            return f"{path}:{frame.lineno}: "
-    return ""
 
 
 def run_evaluate(command: Evaluate) -> None:

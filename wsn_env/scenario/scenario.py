@@ -216,7 +216,9 @@ class Scenario(Section):
                 try:
                     whole[name] = kind(**given)
                 except TypeError:
-                    strange = next(key for key in given if key not in own)
+                    strange = next((key for key in given if key not in own), None)
+                    if strange is None:  # the kind's own mistake
+                        raise
                     raise ScenarioError(
                         f"{kind.__name__} has no quantity {strange!r}: {suggest(strange, own)}"
                     ) from None
