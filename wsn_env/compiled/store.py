@@ -19,7 +19,7 @@ import shutil
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from types import FunctionType
@@ -98,13 +98,13 @@ def open_kernel(
 @contextmanager
 def _alone_in(folder: Path) -> Iterator[None]:
     """No other process opens this kernel meanwhile: it would compile the same, and write over what is signed here."""
-    try:
-        import fcntl
-    except ImportError:  # not on Windows: both compile
-        yield
-        return
-    with open(folder / "lock", "w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
+    with ExitStack() as held:
+        try:
+            import fcntl
+
+            fcntl.flock(held.enter_context(open(folder / "lock", "w")), fcntl.LOCK_EX)
+        except (ImportError, OSError):  # on Windows, or in a folder that can only be read: both compile
+            pass
         yield
 
 
@@ -187,7 +187,8 @@ def _throw_away(folder: Path, why: str) -> None:
     name = folder.name.rpartition("-")[0]
     print(f"wsn_env: the kept kernel {name} is damaged ({why}); compiling it anew", file=sys.stderr, flush=True)
     for path in [*_files(folder), folder / SUMS]:
-        path.unlink(missing_ok=True)
+        with suppress(OSError):
+            path.unlink()
 
 
 def _sign(folder: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -24,7 +25,7 @@ from ray.rllib.utils.numpy import convert_to_numpy
 from ray.tune.registry import register_env
 
 from wsn_env.evaluation.progress import Progress
-from wsn_env.evaluation.ray_engine import connect
+from wsn_env.evaluation.ray_engine import connect, join_driver, send_own_code, software
 from wsn_env.learning.actor_critic import EntryActorCritic
 from wsn_env.learning.levelling import Levelling
 from wsn_env.learning.native_runner import NativeRunner
@@ -124,7 +125,14 @@ class RayTraining:
         self.periods: int = 0
         self._folder = folder
         connect(address)
-        register_env("wsn_env", lambda context: _OwnSeeds(make_rows(context["num_envs"]), seed))
+        send_own_code(ray)
+        here, ours = os.getcwd(), software()
+
+        def make(context: Any) -> gym.vector.VectorEnv:
+            join_driver(here, ours)
+            return _OwnSeeds(make_rows(context["num_envs"]), seed)
+
+        register_env("wsn_env", make)
         each = rows // max(runners, 1)
         self._algorithm = (
             PPOConfig()
