@@ -218,7 +218,15 @@ def test_bad_settings_are_refused_before_anything_is_done(bad, tmp_path):
 
 @pytest.mark.parametrize(
     "options",
-    ["--batch 1", "--learning-rate 1e30", "--learning-rate nan", "--entropy nan", "--rows 0", "--lam a", "--vary nodes"],
+    [
+        "--batch 1",
+        "--learning-rate 1e30",
+        "--learning-rate nan",
+        "--entropy nan",
+        "--rows 0",
+        "--lam a",
+        "--vary nodes",
+    ],
 )
 def test_bad_options_are_one_line(options, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["train.py", "--runs", str(tmp_path), "--episodes", "0", *options.split()])

@@ -181,7 +181,14 @@ def own_place(problem: BaseException) -> str:
 
 def _is_own(file: str) -> bool:
     path, root = Path(file), Path(__file__).parents[2]
-    ours = [root / "wsn_env", root / "agents", root / "train.py", store_folder(), Path(sys.prefix), Path(sys.base_prefix)]
+    ours = [
+        root / "wsn_env",
+        root / "agents",
+        root / "train.py",
+        store_folder(),
+        Path(sys.prefix),
+        Path(sys.base_prefix),
+    ]
     installed = {"site-packages", "dist-packages"} & set(path.parts)
     return path.is_file() and not installed and not any(path.is_relative_to(other) for other in ours)
 

@@ -28,10 +28,10 @@ def power(m: Any, squared: float) -> float:
 class RssiPower(Measurement):
     """Received power: a max(d, floor)^-beta + noise (eq. 1 as printed, 2 <= beta <= 4)."""
 
-    amplitude: float = quantity(100.0, "power a at 1 m, in any unit", above=0)
+    amplitude: float = quantity(100.0, "power a at 1 m, in any unit", at_least=1e-6, at_most=1e9)
     exponent: float = quantity(2.0, "beta", at_least=2, at_most=4)
-    noise: float = quantity(0.2, "sd, in the same unit", above=0)
-    floor_m: float = quantity(1.0, "nearer than this the power grows no more", above=0)
+    noise: float = quantity(0.2, "sd, in the same unit", at_least=1e-9, at_most=1e9)
+    floor_m: float = quantity(1.0, "nearer than this the power grows no more", at_least=1e-6, at_most=1e6)
 
     allocates: ClassVar[bool] = False
 
