@@ -17,8 +17,10 @@ STRENGTHS = [
     dict(measurement="rssi", floor_m=1e-6, noise_db=1e-6),
     dict(measurement="rssi", floor_m=1e6),
     dict(measurement="rssi_power", noise=1e-9),
+    dict(measurement="rssi_power", noise=1e-30, amplitude=1e-30),
+    dict(measurement="rssi_power", noise=1e-30, amplitude=1e-12),
     dict(measurement="rssi_power", noise=1e-9, amplitude=1e9, floor_m=1e-6),
-    dict(measurement="rssi_power", noise=1e9, amplitude=1e-6),
+    dict(measurement="rssi_power", noise=1e15, amplitude=1e-30),
 ]
 EDGES = [
     *STRENGTHS,
@@ -78,7 +80,7 @@ def test_quantities_at_the_edge_of_what_is_allowed_give_numbers(name, edge):
         ("Rssi-v0", dict(exponent=1e300), "Rssi.exponent"),
         ("Underwater-v0", dict(noise_db=2.5e-8), "Sonar.noise_db"),
         ("Underwater-v0", dict(sleep_w=0.02), "Modem.sleep_w = 0.02: must be at most listen_w = 0.0125"),
-        ("PreDC-v0", dict(measurement="rssi_power", noise=1e-12), "RssiPower.noise"),
+        ("PreDC-v0", dict(measurement="rssi_power", noise=1e-20), "RssiPower.noise = 1e-20: must be at least 1e-16"),
         ("PreDC-v0", dict(radius_m=1e110), r"Detection.radius_m = 1e\+110: .* at most 100000"),
         ("PreDC-v0", dict(decay_power=170), "Detection.decay_power = 170: .* at most 50"),
         ("PreDC-v0", dict(edge_power=1e4), "Detection.edge_power"),
