@@ -33,7 +33,7 @@ from wsn_env.evaluation.progress import progress_bar
 from wsn_env.evaluation.rollout import FIRST_SEED, evaluation_seeds
 from wsn_env.evaluation.versions import versions
 from wsn_env.learning.actor_critic import EntryPolicy, actor_network, entry_sizes
-from wsn_env.learning.checkpoints import Watch, load_checkpoint
+from wsn_env.learning.checkpoints import Watch, check_finite, load_checkpoint
 from wsn_env.learning.concat_vector_env import ConcatVectorEnv
 from wsn_env.learning.defaults import default_level, default_node_counts, default_order
 from wsn_env.learning.levelling import LevelledRollout
@@ -43,6 +43,7 @@ from wsn_env.learning.run_folder import facts_of, open_folder, open_progress
 from wsn_env.learning.sb3 import SB3VecEnv
 from wsn_env.learning.training_reward import TrainingReward
 from wsn_env.models.measurement.base import Order
+from wsn_env.models.own import own_error, own_place
 from wsn_env.models.quantity import check_quantity, parse_overrides
 from wsn_env.reports.pages.evaluation_page import write_report
 from wsn_env.reports.pictures import write_picture
@@ -151,7 +152,12 @@ def main() -> int:
     try:
         train(settings)
     except (ValueError, OSError, MemoryError) as problem:
-        print(f"train.py: {problem}", file=sys.stderr)
+        print(f"train.py: {own_place(problem)}{problem}", file=sys.stderr)
+        return 2
+    except Exception as problem:
+        if not own_place(problem):
+            raise
+        print(f"train.py: {own_error(problem)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print(f"train.py: stopped; the same command with --resume continues {settings.folder}", file=sys.stderr)
@@ -219,6 +225,9 @@ def learn_locally(settings: Training, scenario: Scenario, interface: Settings, f
             watch = Watch(folder, settings.steps, settings.checkpoint_steps, facts, report)
             try:
                 model.learn(left, callback=watch, reset_num_timesteps=False)
+            except (ValueError, RuntimeError):
+                check_finite(model)  # torch's own words about NaN fill a screen
+                raise
             finally:
                 watch.save()
         seconds = time.perf_counter() - started
@@ -280,11 +289,15 @@ def check_settings(settings: Training) -> None:
     """Refuse now what would fail after the training."""
     for name in "steps rows rollout batch epochs torch_threads checkpoint_steps".split():
         check_quantity("train.py", name, getattr(settings, name), at_least=1, whole=True)
+    check_quantity("train.py", "batch", settings.batch, at_least=2)  # advantages are normalised by its sd
     for name in ("gamma", "gae_lambda", "level"):
         check_quantity("train.py", name, getattr(settings, name), at_least=0, at_most=1)
+    check_quantity("train.py", "learning_rate", settings.learning_rate, above=0, at_most=1)
+    check_quantity("train.py", "entropy", settings.entropy, at_least=0, at_most=100)
     for name in ("units", "critic"):
         for units in getattr(settings, name):
-            check_quantity("train.py", name, units, at_least=1, whole=True)
+            check_quantity("train.py", name, units, at_least=1, at_most=4096, whole=True)
+    check_quantity("train.py", "torch_threads", settings.torch_threads, at_least=1, at_most=1024)
     for name, hint in get_type_hints(Training).items():
         if get_origin(hint) is Literal and getattr(settings, name) not in get_args(hint):
             allowed = ", ".join(get_args(hint))

@@ -18,6 +18,7 @@ from gymnasium.spaces import Discrete
 from wsn_env.agents.base import ViewPolicy
 from wsn_env.envs.interface import Interface, Settings
 from wsn_env.evaluation.files import replacing
+from wsn_env.evaluation.policies import read_saved
 from wsn_env.learning.network import EntryNetwork, FlatNetwork, PolicyNetwork
 from wsn_env.models.state import Cluster
 from wsn_env.simulation.view import View
@@ -51,15 +52,15 @@ class PPOPolicy(ViewPolicy):
                 f"policy 'ppo': none comes with the package for {self.scenario.name}, only for {shipped}: train one"
                 " with train.py and name its policy.json"
             )
+        said = read_saved(path, "interface")
         try:
-            saved = json.loads(path.read_text())
-            settings = Settings(**saved["interface"])
+            settings = Settings(**said)
             if (settings.action, settings.observation) not in INTERFACES:
                 pair = settings.action, settings.observation
-                raise ValueError(f"{path}: (action, observation) = {pair}: must be one of {INTERFACES}")
+                raise ValueError(f"(action, observation) = {pair}: must be one of {INTERFACES}")
             interface = Interface(self.scenario, settings)
-        except (OSError, KeyError, TypeError, UnicodeDecodeError) as problem:
-            raise ValueError(f"{path} is not a saved policy: {problem!r}") from None
+        except (TypeError, ValueError) as problem:
+            raise ValueError(f"{path} is not a saved policy: {problem}") from None
         network = PolicyNetwork.load(path.with_suffix(".safetensors"))
         inputs, logits = interface.observation.space.shape[0], sum(_logit_counts(interface.action.space))
         if not network.fits(inputs, logits):

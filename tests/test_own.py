@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from wsn_env import Scenario, View, World, evaluate, make_policy
+from wsn_env.cli import main
 from wsn_env.models.own import class_in
 from wsn_env.models.quantity import ScenarioError
 
@@ -136,3 +137,176 @@ def test_mistakes_are_named(folder, monkeypatch, text, words):
     monkeypatch.chdir(folder)
     with pytest.raises(ValueError, match=words):
         Scenario.named("PreDC-v0", measurement=text)
+
+
+WSN = [sys.executable, "-c", "import sys; sys.path.pop(0); from wsn_env.cli import main; sys.exit(main())"]  # as `wsn`
+OWN = """
+import helper
+from wsn_env import Cluster
+
+class Mine:
+    '''With a helper beside it.'''
+
+    def __init__(self, scenario, mode="none"):
+        self.mode = mode
+        if mode == "made":
+            {}["made"]
+        if mode == "type":
+            len(3)
+
+    def act(self, view):
+        import late
+        if self.mode == "act":
+            return {}["act"]
+        if self.mode == "beside":
+            late.fail()
+        return Cluster.of(view.nearest_living(), view.alive & False)
+
+    def numbers(self):
+        import late
+        return helper.NUMBER, late.NUMBER
+"""
+FILES = {
+    "mine.py": OWN,
+    "helper.py": "NUMBER = 1\n",
+    "late.py": "import helper\n\nNUMBER = 10 * helper.NUMBER\n\ndef fail():\n    raise KeyError('late')\n",
+    "syntax.py": "x = 1\ndef f(:\n",
+    "imports.py": "\nimport nosuchmodule\n",
+    "beside.py": "import broken\n",
+    "broken.py": "\n\n1 / 0\n",
+    "key.py": "{}['key']\n",
+    "exits.py": "import sys\nsys.exit(3)\n",
+    "lines.py": "raise RuntimeError('one\\ntwo')\n",
+    "empty.py": "",
+    "deep.py": "def f():\n    f()\nf()\n",
+    "name.py": "class Mine(Missing):\n    pass\n",
+}
+
+
+@pytest.fixture
+def own(tmp_path):
+    for name, text in FILES.items():
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("policy", "said"),
+    [
+        ("syntax.py:X", "policy 'syntax.py:X': {}/syntax.py:2: SyntaxError: invalid syntax"),
+        ("imports.py:X", "policy 'imports.py:X': {}/imports.py:2: ModuleNotFoundError: No module named 'nosuchmodule'"),
+        ("beside.py:X", "policy 'beside.py:X': {}/broken.py:3: ZeroDivisionError: division by zero"),
+        ("key.py:X", "policy 'key.py:X': {}/key.py:1: KeyError: 'key'"),
+        ("exits.py:X", "policy 'exits.py:X': {}/exits.py:2: SystemExit: 3"),
+        ("lines.py:X", "policy 'lines.py:X': {}/lines.py:1: RuntimeError: one"),
+        ("empty.py:X", "policy 'empty.py:X': the file has no such class: known are none"),
+        ("deep.py:X", "policy 'deep.py:X': {}/deep.py:2: RecursionError: maximum recursion depth exceeded"),
+        ("name.py:X", "policy 'name.py:X': {}/name.py:1: NameError: name 'Missing' is not defined"),
+        ("mine.py:Mine:mode=made", "policy 'mine.py:Mine:mode=made': {}/mine.py:11: KeyError: 'made'"),
+        ("mine.py:Mine:mode=type", "policy 'mine.py:Mine:mode=type': {}/mine.py:13: cannot be made with"),
+        ("mine.py:Mine:mode=act", "{}/mine.py:18: KeyError: 'act'"),
+        ("mine.py:Mine:mode=beside", "{}/late.py:6: KeyError: 'late'"),
+    ],
+)
+def test_an_error_in_own_code_is_a_line_with_its_place(own, monkeypatch, capsys, policy, said):
+    monkeypatch.chdir(own)
+    assert main(["evaluate", "--policies", policy, "--episodes", "1", "--set", "particles=50", "periods=3"]) == 2
+    last = capsys.readouterr().err.strip().splitlines()[-1]
+    assert last.startswith(f"wsn: {said.format(own)}")
+
+
+SENSOR = """
+from dataclasses import dataclass
+from wsn_env.models import Line, Measurement
+import helper
+
+@dataclass(frozen=True)
+class Own(Measurement):
+    def __post_init__(self):
+        {made}
+
+    @staticmethod
+    def sample(m, stream, node, x, y):
+        return x + helper.NUMBER, 0.0
+
+    @staticmethod
+    def log_likelihood(m, value, second, node, x, y):
+        return {value}
+
+    @staticmethod
+    def linearise(m, node, belief):
+        return (Line(belief.x, 1.0, 0.0, 1.0),)
+"""
+
+
+@pytest.mark.parametrize(
+    ("made", "value", "line", "said"),
+    [
+        ("{}['made']", "0.0", 9, "KeyError: 'made'"),
+        ("pass", "missing * value", None, "TypingError: NameError: name 'missing' is not defined"),
+        ("pass", "'a' * value", None, "TypingError: No implementation of function"),
+    ],
+)
+def test_an_error_in_an_own_sensor_is_a_line_with_its_place(own, monkeypatch, capsys, made, value, line, said):
+    monkeypatch.chdir(own)
+    (own / "sensor.py").write_text(SENSOR.replace("{made}", made).replace("{value}", value))
+    small = ["particles=50", "periods=3", "nodes=20", "side_m=50", "crossing_m=20", "measurement=sensor.py:Own"]
+    assert main(["evaluate", "--policies", "nearest1", "--episodes", "1", "--set", *small]) == 2
+    last = capsys.readouterr().err.strip().splitlines()[-1]
+    assert last.startswith(f"wsn: {own}/sensor.py:{line or ''}") and said in last
+
+
+def test_files_beside_an_own_one_are_found_by_the_console_script(own):
+    command = [*WSN, "evaluate", "--policies", f"{own}/mine.py:Mine", "--episodes", "1"]
+    elsewhere = own / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "helper.py").write_text("raise ValueError('the wrong helper')\n")
+    done = subprocess.run(
+        [*command, "--set", "particles=50", "periods=3"], cwd=elsewhere, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_folders_with_files_of_the_same_names_do_not_mix(own, tmp_path_factory, monkeypatch):
+    other = tmp_path_factory.mktemp("other")
+    for name in ("mine.py", "late.py"):
+        shutil.copy(own / name, other)
+    (other / "helper.py").write_text("NUMBER = 2\n")
+    (other / "random.py").write_text("raise ValueError('the wrong random')\n")
+    monkeypatch.syspath_prepend(str(tmp_path_factory.mktemp("path")))
+    first, second = (class_in(folder / "mine.py", "Mine")(None) for folder in (own, other))
+    assert first.numbers() == (1, 10) and second.numbers() == (2, 20) and first.numbers() == (1, 10)
+    assert "helper" not in sys.modules and "late" not in sys.modules
+    import random
+
+    assert random.random() < 1
+
+
+@pytest.mark.parametrize("edited", ["mine.py", "helper.py", "late.py"])
+def test_an_edited_file_is_read_again_in_the_same_session(own, edited):
+    """Of the same size, within the same second: Python's bytecode would be taken for current."""
+    before = class_in(own / "mine.py", "Mine")
+    assert before(None).numbers() == (1, 10) and class_in(own / "mine.py", "Mine") is before
+    texts = {"mine.py": ("(self):\n        import late", "(self):\n        late = helper"), "helper.py": ("1", "3")}
+    old, new = texts.get(edited, ("10 *", "20 *"))
+    stat = (own / edited).stat()
+    (own / edited).write_text((own / edited).read_text().replace(old, new))
+    os.utime(own / edited, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+    after = class_in(own / "mine.py", "Mine")
+    assert after(None).numbers() == {"mine.py": (1, 1), "helper.py": (3, 30), "late.py": (1, 20)}[edited]
+
+
+def test_packages_and_relative_imports_beside_an_own_file(own):
+    (own / "tools").mkdir()
+    (own / "tools" / "__init__.py").write_text("from .inner import VALUE\n")
+    (own / "tools" / "inner.py").write_text("import helper\n\nVALUE = 5 + helper.NUMBER\n")
+    (own / "uses.py").write_text(
+        "import os.path, tools.inner as inner, tools\nfrom .helper import NUMBER\nfrom tools import VALUE\n"
+        "class Own:\n    found = NUMBER, VALUE, inner.VALUE, tools.inner.VALUE\n"
+    )
+    assert class_in(own / "uses.py", "Own").found == (1, 6, 6, 6)
+    (own / "broken.py").write_text("NOW = 7\n")
+    with pytest.raises(ValueError, match="KeyError"):
+        class_in(own / "key.py", "X")
+    (own / "key.py").write_text("import broken\nclass X:\n    now = broken.NOW\n")
+    assert class_in(own / "key.py", "X").now == 7

@@ -130,3 +130,55 @@ def test_a_learned_policy_travels_without_its_file(tmp_path):
     arrived = pickle.loads(sent)
     rows = evaluate({"it": arrived}, SCENARIO, [4.0], 3).values("it", 4.0, "return")
     assert (rows == evaluate({"it": shipped}, SCENARIO, [4.0], 3).values("it", 4.0, "return")).all()
+
+
+OWN = """
+import helper
+from wsn_env import make_policy
+
+class Mine:
+    def __init__(self, scenario, fails=False):
+        self.scenario, self.fails = scenario, fails
+        self.other = make_policy(f"nearest{helper.COUNT}", scenario)
+
+    def act(self, view):
+        if self.fails:
+            return {}["gone"]
+        assert open("data.txt").read() == "here"
+        return helper.act(self.other, view)
+"""
+HELPER = """
+COUNT = 2
+
+def act(policy, view):
+    return policy.act(view)
+"""
+
+
+@pytest.mark.slow
+def test_relative_paths_and_files_beside_an_own_one_reach_workers_begun_elsewhere(tmp_path, monkeypatch, capsys):
+    ray = pytest.importorskip("ray")
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own" / "mine.py").write_text(OWN)
+    (tmp_path / "own" / "helper.py").write_text(HELPER)
+    (tmp_path / "data.txt").write_text("here")
+    (tmp_path / "track.csv").write_text("t,x,y\n0,10,10\n10,40,40\n")
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    ray.init("local", num_cpus=1, log_to_driver=False)
+    try:
+        monkeypatch.chdir(tmp_path)
+        scenario = SCENARIO.override(motion="recorded", tracks=("track.csv",))
+        spread = evaluate(["own/mine.py:Mine", "nearest2"], scenario, [4.0], 3, engine=on_ray())
+        returns = [list(spread.values(name, 4.0, "return")) for name in spread.policies]
+        assert returns[0] == returns[1]
+        asked = ["--policies", "own/mine.py:Mine:fails=true", "--episodes", "2", "--engine", "ray"]
+        assert main(["evaluate", *asked]) == 2
+        last = capsys.readouterr().err.strip().splitlines()[-1]
+        assert last == f"wsn: {tmp_path}/own/mine.py:12: KeyError: 'gone'"
+        with monkeypatch.context() as patch:
+            patch.setattr("wsn_env.evaluation.ray_engine.software", lambda: {"numba": "0.1"})
+            with pytest.raises(ValueError, match="has numba .* instead of 0.1: must be the same on every node"):
+                evaluate(["nearest2"], SCENARIO, [4.0], 2, engine=on_ray())
+    finally:
+        ray.shutdown()

@@ -1,11 +1,13 @@
 """Kernels are kept by what they compute: docstrings and comments compile nothing, constants whoever uses them."""
 
 import os
+import pickle
 import subprocess
 import sys
 import textwrap
 from concurrent.futures import ThreadPoolExecutor
 
+import numba
 import pytest
 
 MODULES = {
@@ -86,17 +88,27 @@ def test_what_is_compiled_is_what_has_changed(folder):
 
 
 @pytest.mark.parametrize("ending", ["nbc", "nbi"])
-@pytest.mark.parametrize("damage", ["cut", "changed", "empty"])
+@pytest.mark.parametrize("damage", ["cut", "changed", "empty", "garbage", "one byte", "another pickle", "wrong pickle"])
 def test_a_damaged_file_is_compiled_anew_and_said(folder, ending, damage):
     run(folder)
     (path,) = [path for path in (folder / "kept").rglob(f"*.{ending}") if "first" in path.name]
     whole = path.read_bytes()
     middle = len(whole) // 2
     flipped = whole[:middle] + bytes(255 - byte for byte in whole[middle : middle + 64]) + whole[middle + 64 :]
-    path.write_bytes({"cut": whole[:middle], "changed": flipped, "empty": b""}[damage])
+    damaged = {
+        "cut": whole[:middle],
+        "changed": flipped,
+        "empty": b"",
+        "garbage": bytes(range(256)) * 8,
+        "one byte": whole[:1],
+        "another pickle": pickle.dumps({"no": ["index"]}),
+        "wrong pickle": pickle.dumps(numba.__version__) + pickle.dumps((None, {0: 1})),
+    }
+    path.write_bytes(damaged[damage])
     words, said = run(folder)
     assert words == ["6.0", "7.0", "first"]
-    assert "the kept kernel work.first" in said.replace("__main__", "work") and "is damaged" in said
+    if (ending, "pickle" in damage) != ("nbi", True):  # else Numba takes it for one of another version
+        assert "the kept kernel work.first" in said.replace("__main__", "work") and "is damaged" in said
     assert run(folder) == (["6.0", "7.0"], "")
 
 
@@ -206,9 +218,58 @@ def test_without_compiling_the_same_comes_out(folder):
     assert "compiling" not in said and "Warning" not in said
 
 
-def test_it_imports_where_processes_do_not_fork(folder):
-    code = "import os, gymnasium, numba, scipy; del os.register_at_fork; import wsn_env.cli, wsn_env.envs.env"
-    assert run(folder, "-c", f"{code}; print('well')")[0] == ["well"]
+@pytest.mark.parametrize("name", ["kernel.py", "sums.txt"])
+@pytest.mark.parametrize("text", [b"", b"\xff\xfe\x00", b"a b c\n" * 9])
+def test_what_lies_beside_a_kernel_may_be_anything(folder, name, text):
+    run(folder)
+    for path in (folder / "kept").rglob(name):
+        path.write_bytes(text)
+    assert run(folder)[0][:2] == ["6.0", "7.0"] and run(folder) == (["6.0", "7.0"], "")
+
+
+WITHOUT = {
+    "Windows": "fcntl resource pwd grp termios",
+    "macOS": "",
+}
+MISSING = {
+    "Windows": "os.register_at_fork os.sched_getaffinity os.sched_setaffinity os.fork os.getuid os.geteuid os.getgid"
+    " os.uname os.sysconf os.mkfifo os.getloadavg os.killpg os.getpgid os.O_DIRECTORY signal.SIGKILL signal.SIGHUP"
+    " signal.SIGALRM",
+    "macOS": "os.sched_getaffinity os.sched_setaffinity os.memfd_create os.posix_fadvise",
+}
+IMPORT = """
+import importlib, os, pathlib, pkgutil, signal, sys
+import gymnasium, matplotlib, numba, rich.console, scipy.stats, stable_baselines3, torch, tyro, safetensors.numpy
+
+for name in {modules!r}.split():
+    sys.modules[name] = None  # to import it raises ImportError
+for name in {names!r}.split():
+    module, name = name.split(".")
+    vars(globals()[module]).pop(name, None)
+import wsn_env, wsn_env.agents
+for package in (wsn_env, wsn_env.agents):
+    for module in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
+        if module.name not in ("wsn_env.__main__", "wsn_env.learning.rllib", "wsn_env.learning.native_runner"):
+            importlib.import_module(module.name)
+from wsn_env.compiled.kernels import available_threads
+import work
+print(work.first(2.0), available_threads() > 0)
+"""
+
+
+@pytest.mark.parametrize("system", MISSING)
+def test_it_imports_and_runs_where_names_of_linux_are_missing(folder, system):
+    code = IMPORT.format(modules=WITHOUT[system], names=MISSING[system])
+    assert run(folder, "-c", code)[0] == ["6.0", "True"]
+
+
+def test_a_store_that_can_only_be_read_is_read(folder):
+    """A folder that somebody else has filled: here, where the lock cannot be opened."""
+    run(folder)
+    for path in (folder / "kept").rglob("lock"):
+        path.unlink()
+        path.mkdir()
+    assert run(folder) == (["6.0", "7.0"], "")
 
 
 def test_a_store_that_cannot_be_written_is_done_without(folder):

@@ -389,12 +389,93 @@ def test_advantages_are_levelled_as_asked_for_or_where_nodes_measure_positions(a
         dict(address="auto"),
         dict(runners=-1),
         dict(rows=5, engine="ray"),
+        dict(batch=1),
+        dict(batch=-5),
+        dict(rows=0),
+        dict(steps=-1),
+        dict(epochs=0),
+        dict(checkpoint_steps=0),
+        dict(torch_threads=10**9),
+        dict(units=(8, 10**9)),
+        dict(critic=(-1, 8)),
+        dict(learning_rate=1e30),
+        dict(learning_rate=0.0),
+        dict(learning_rate=-1e-3),
+        dict(learning_rate=float("nan")),
+        dict(learning_rate=float("inf")),
+        dict(entropy=float("nan")),
+        dict(entropy=-0.1),
+        dict(entropy=1e30),
+        dict(gamma=float("nan")),
+        dict(gae_lambda=-0.1),
+        dict(level=float("nan")),
+        dict(lam=[float("nan")]),
+        dict(lam=[-1.0]),
+        dict(lam=[3.0, 1.0]),
+        dict(lam=[1.0, 2.0, 3.0]),
+        dict(seed=-1),
     ],
 )
 def test_bad_settings_are_refused_before_anything_is_done(bad, tmp_path):
     with pytest.raises(ValueError, match=next(iter(bad))):
         train.train(train.Training(name="bad", runs=tmp_path, **(SHORT | bad)))
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        "--batch 1",
+        "--learning-rate 1e30",
+        "--learning-rate nan",
+        "--entropy nan",
+        "--rows 0",
+        "--lam a",
+        "--vary nodes",
+    ],
+)
+def test_bad_options_are_one_line(options, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["train.py", "--runs", str(tmp_path), "--episodes", "0", *options.split()])
+    try:
+        code = train.main()
+    except SystemExit as stopped:  # what tyro finds out prints its usage
+        code = stopped.code
+    said = capsys.readouterr().err
+    assert code == 2 and (options == "--lam a" or said.count("\n") == 1), said
+
+
+@pytest.mark.parametrize("beside", ["", "short"])
+def test_a_file_where_a_folder_is_wanted_is_one_line(beside, tmp_path, monkeypatch, capsys):
+    runs = tmp_path / "runs"
+    if beside:
+        runs.mkdir()
+    (runs / beside).write_text("")
+    asked = ["--runs", str(runs), "--name", "short", "--episodes", "0", "--set", *SET]
+    monkeypatch.setattr(sys, "argv", ["train.py", *asked])
+    assert train.main() == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and str(runs) in said
+
+
+@pytest.mark.parametrize("when", ["update", "end"])
+def test_a_training_that_diverges_stops_and_keeps_the_checkpoint_before(when, tmp_path, monkeypatch, capsys):
+    """Weights that are no numbers: said in one line, not saved."""
+    kept = []
+    real = train.PPO.train
+
+    def diverge(model):
+        real(model)
+        if model.num_timesteps >= (2048 if when == "update" else SHORT["steps"]):
+            kept.extend(path.read_bytes() for path in (tmp_path / "bad").glob("checkpoint*"))
+            with torch.no_grad():
+                next(iter(model.policy.parameters()))[:] = np.nan
+
+    monkeypatch.setattr(train.PPO, "train", diverge)
+    with pytest.raises(ValueError, match="training diverged after .* periods.* learning_rate than 0.002") as told:
+        train.train(train.Training(name="bad", runs=tmp_path, **(SHORT | dict(episodes=0))))
+    assert "\n" not in str(told.value)
+    assert kept and [path.read_bytes() for path in (tmp_path / "bad").glob("checkpoint*")] == kept
+    assert not (tmp_path / "bad" / "policy.json").exists()
 
 
 def test_a_mistyped_run_leaves_no_trap(tmp_path):

@@ -34,7 +34,7 @@ def test_too_few_nodes_or_nodes_on_a_line_fix_nothing(chosen):
 
 
 @pytest.mark.parametrize(
-    "overrides", [dict(measurement="rssi", noise_db=1e-9), dict(measurement="rssi_power", noise=1e-9)]
+    "overrides", [dict(measurement="rssi", noise_db=1e-6), dict(measurement="rssi_power", noise=1e-9)]
 )
 def test_ranges_turn_the_strength_law_round(overrides):
     scenario = Scenario.named("PreDC-v0", **overrides)
@@ -42,7 +42,7 @@ def test_ranges_turn_the_strength_law_round(overrides):
     strengths = LinearModel(scenario).expected([point], NODES)[0]
     squared, sd = scenario.measurement.squared_ranges(strengths, 1e4)
     np.testing.assert_allclose(squared, ((NODES - point) ** 2).sum(axis=1), rtol=1e-9)
-    nearby, _ = scenario.measurement.squared_ranges(strengths + 1e-9, 1e4)
+    nearby, _ = scenario.measurement.squared_ranges(strengths + overrides.get("noise_db", 1e-9), 1e4)
     np.testing.assert_allclose(np.abs(nearby - squared), sd, rtol=1e-3)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import time
-import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
@@ -16,6 +15,7 @@ import tyro
 
 from wsn_env.evaluation.files import alone_in
 from wsn_env.evaluation.progress import progress_bar
+from wsn_env.models.own import own_error, own_place
 from wsn_env.models.quantity import parse_overrides
 from wsn_env.models.recordings.files import DatasetWarning
 from wsn_env.scenario import Scenario
@@ -126,7 +126,12 @@ def main(arguments: list[str] | None = None) -> int:
         with warnings_on_one_line(), nullcontext() if folder is None else alone_in(folder, FILES):
             runs[type(command)](command)
     except (ValueError, OSError, MemoryError) as problem:
-        print(f"wsn: {user_code_location(problem)}{problem}", file=sys.stderr)
+        print(f"wsn: {own_place(problem)}{problem}", file=sys.stderr)
+        return 2
+    except Exception as problem:
+        if not own_place(problem):
+            raise
+        print(f"wsn: {own_error(problem)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         kept = isinstance(command, Evaluate) and command.out
@@ -149,21 +154,6 @@ def warnings_on_one_line() -> Iterator[None]:
 
         warnings.showwarning = show  # type: ignore[assignment]
         yield
-
-
-def user_code_location(problem: Exception) -> str:
-    """Where it arose, if that is in a file of the user's own: "mine.py:12: "."""
-    others: list[str | Path] = [
-        Path(__file__).parents[1] / "wsn_env",
-        Path(__file__).parents[1] / "agents",
-        sys.prefix,
-        sys.base_prefix,
-    ]
-    for frame in reversed(traceback.extract_tb(problem.__traceback__)):
-        path = Path(frame.filename)
-        if path.is_file() and not any(path.is_relative_to(folder) for folder in others):
-            return f"{path}:{frame.lineno}: "
-    return ""
 
 
 def run_evaluate(command: Evaluate) -> None:

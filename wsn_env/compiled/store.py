@@ -19,7 +19,7 @@ import shutil
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from types import FunctionType
@@ -79,6 +79,7 @@ def open_kernel(
             _throw_away_damaged(folder)
             dispatcher = _dispatcher(function, options, source)
             _opened[dispatcher] = name
+            before = len(compiled)
             try:
                 result = _without_collecting(dispatcher, arguments)
             except NumbaError:  # the function's own mistake
@@ -91,20 +92,20 @@ def open_kernel(
                 _opened[dispatcher] = name
                 result = _without_collecting(dispatcher, arguments)
             _folders.append(folder)
-            _sign(folder)
+            _sign(folder, anew=len(compiled) > before)
         return dispatcher, result
 
 
 @contextmanager
 def _alone_in(folder: Path) -> Iterator[None]:
     """No other process opens this kernel meanwhile: it would compile the same, and write over what is signed here."""
-    try:
-        import fcntl
-    except ImportError:  # not on Windows: both compile
-        yield
-        return
-    with open(folder / "lock", "w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
+    with ExitStack() as held:
+        try:
+            import fcntl
+
+            fcntl.flock(held.enter_context(open(folder / "lock", "w")), fcntl.LOCK_EX)
+        except (ImportError, OSError):  # on Windows, or in a folder that can only be read: both compile
+            pass
         yield
 
 
@@ -144,6 +145,9 @@ def _prepare(folder: Path, function: FunctionType) -> Path:
         others = [other for other in folder.parent.glob(f"{stem}-*") if other.name.rpartition("-")[0] == stem]
         for old in sorted(others, key=_age)[KEPT:]:
             shutil.rmtree(old, ignore_errors=True)
+    elif source.stat().st_mtime != THE_SAME_TIME:  # copied, or touched
+        with suppress(OSError):
+            os.utime(source, (THE_SAME_TIME, THE_SAME_TIME))
     return source
 
 
@@ -187,12 +191,13 @@ def _throw_away(folder: Path, why: str) -> None:
     name = folder.name.rpartition("-")[0]
     print(f"wsn_env: the kept kernel {name} is damaged ({why}); compiling it anew", file=sys.stderr, flush=True)
     for path in [*_files(folder), folder / SUMS]:
-        path.unlink(missing_ok=True)
+        with suppress(OSError):
+            path.unlink()
 
 
-def _sign(folder: Path) -> None:
-    """Write down the checksums of the data files that have none yet."""
-    sums = _sums(folder)
+def _sign(folder: Path, anew: bool = False) -> None:
+    """Write down the checksums of the data files that have none yet, or of all."""
+    sums = {} if anew else _sums(folder)
     new = {path.name: _sum(path) for path in _files(folder) if path.suffix == ".nbc" and path.name not in sums}
     if new:
         try:

@@ -13,7 +13,7 @@ from inspect import signature
 from pathlib import Path
 from typing import Any, Protocol
 
-from wsn_env.models.own import class_in
+from wsn_env.models.own import class_in, own_error, own_place
 from wsn_env.models.quantity import is_line, parse_overrides, short, suggest
 from wsn_env.models.state import Cluster
 from wsn_env.scenario import Scenario
@@ -66,7 +66,7 @@ def make_policy(name: str, scenario: Scenario | str, **parameters: Any) -> Polic
             raise ValueError(f"policy {name!r}: its entry point {point.value!r} fails: {problem}") from None
         return _create_policy(name, maker, scenario, parameters | number | _parse_parameters(colon, text))
     path = Path(name)
-    path = path / "policy.json" if path.is_dir() else path
+    path = path / "policy.json" if path.is_dir() and path.name != "policy.json" else path
     if path.suffix == ".py":
         raise ValueError(f"policy {name!r}: which class of it? {name}:CLASS")
     if path.suffix == ".json" or len(path.parts) > 1:
@@ -139,10 +139,12 @@ def _create_policy(name: str, maker, scenario: Scenario, parameters: dict) -> Po
     try:
         policy = maker(scenario=scenario, **parameters)
     except TypeError as problem:
-        instead = _suggest_parameter(maker, parameters)
-        raise ValueError(
-            f"policy {name!r}: cannot be made with a scenario and its parameters: {problem}{instead}"
-        ) from problem
+        told = f"cannot be made with a scenario and its parameters: {problem}{_suggest_parameter(maker, parameters)}"
+        raise ValueError(f"policy {name!r}: {own_place(problem)}{told}") from problem
+    except Exception as problem:
+        if isinstance(problem, ValueError) or not own_place(problem):
+            raise
+        raise ValueError(f"policy {name!r}: {own_error(problem)}") from problem
     if not callable(getattr(policy, "act", None)):
         raise ValueError(f"policy {name!r}: has no act(view)")
     return policy
@@ -158,14 +160,25 @@ def _suggest_parameter(maker: Any, parameters: dict) -> str:
     return f": {suggest(strange[0], own)}" if strange and own else ""
 
 
+def read_saved(path: Path, key: str) -> Any:
+    """What a policy.json says under a key.
+
+    Raises:
+        ValueError: the file is missing, damaged or another; names it.
+    """
+    if not path.is_file():
+        raise ValueError(f"{path} is not a saved policy: there is no such file")
+    try:
+        return json.loads(path.read_text())[key]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as problem:
+        raise ValueError(f"{path} is not a saved policy: {problem!r}") from None
+
+
 def load_learned(path: Path, scenario: Scenario) -> Policy:
     """A saved policy: its policy.json names the entry point of the kind that can read it."""
-    try:
-        kind = json.loads(path.read_text())["kind"]
-    except FileNotFoundError:
-        raise ValueError(f"policy {str(path)!r} does not exist") from None
-    except (ValueError, KeyError, TypeError, UnicodeDecodeError) as problem:
-        raise ValueError(f"{path} is not a saved policy: {problem!r}") from None
+    if not path.exists():
+        raise ValueError(f"policy {str(path)!r} does not exist")
+    kind = read_saved(path, "kind")
     if kind not in policy_names():
         raise ValueError(f"{path} is not a saved policy: its kind is {kind!r}, known are {', '.join(policy_names())}")
     try:

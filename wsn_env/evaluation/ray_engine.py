@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import logging
+import os
 import socket
-import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from wsn_env.evaluation.rollout import Block, Engine, in_this_process
-from wsn_env.models.own_files import OF_FILES, add_noted, noted_files, watch
+from wsn_env.evaluation.versions import sources_digest, versions
+from wsn_env.models.own import own_modules, own_place
+from wsn_env.models.own_files import add_noted, noted_files, watch
 
 if TYPE_CHECKING:
     from ray import ObjectRef
+
+Measurement = tuple[list[dict[str, float]], dict[str, str]]
 
 AHEAD = 4  # tasks a core that wait their turn
 PATIENCE_S = 5.0
@@ -68,32 +72,91 @@ def connect(address: str | None) -> None:
         ray.init(address or "local", log_to_driver=False, logging_level=logging.ERROR)
     except ConnectionError as problem:
         raise ValueError(f"engine 'ray': no cluster at {address!r} ({problem}): {allowed}") from None
+    except RuntimeError as problem:  # another version of Python or of Ray
+        told = " ".join(str(problem).split())
+        raise ValueError(f"engine 'ray': cannot join the cluster at {address!r}: {told}") from None
+
+
+def send_own_code(ray: ModuleType) -> None:
+    """Send the code of files given by path along with what is made of it: workers cannot import it."""
+    for module in own_modules():
+        ray.cloudpickle.register_pickle_by_value(module)
 
 
 def _play_blocks(ray: ModuleType, blocks: Sequence[Block]) -> Iterator[tuple[Block, list[dict[str, float]]]]:
-    for module in {type(block.policy).__module__ for block in blocks}:
-        if module.startswith(OF_FILES):  # which workers cannot import
-            ray.cloudpickle.register_pickle_by_value(sys.modules[module])
-    task = ray.remote(num_cpus=1, max_retries=-1, scheduling_strategy="SPREAD")(_measure_block)
+    send_own_code(ray)
+    task = ray.remote(num_cpus=1, max_retries=-1, scheduling_strategy="SPREAD")(_task(os.getcwd(), software()))
     waiting = list(reversed(blocks))
     running: dict[ObjectRef[Any], Block] = {}
     while waiting or running:
         most = AHEAD * max(1, int(ray.cluster_resources().get("CPU", 1)))
         while waiting and len(running) < most:
             block = waiting.pop()
-            running[task.remote(block)] = block
+            running[task.remote(ray.cloudpickle.dumps(block))] = block
         for done in ray.wait(list(running))[0]:
             try:
                 measured, files = ray.get(done)
             except ray.exceptions.RayTaskError as problem:  # the policy's or the world's own error
                 raise problem.cause from None
+            except ray.exceptions.RayError as problem:
+                raise ValueError(
+                    f"engine 'ray': the cluster is lost ({str(problem).partition(chr(10))[0]}); finished blocks are"
+                    " kept where there is a folder for them"
+                ) from None
             block = running.pop(done)
             add_noted(type(block.policy).__module__, files)
             yield block, measured
 
 
-def _measure_block(block: Block) -> tuple[list[dict[str, float]], dict[str, str]]:
-    """What `rollout` measured, and the digests of what own code has read for it."""
+def software() -> dict[str, str]:
+    """What driver and workers must have in common."""
+    return versions() | {"sources of wsn_env": sources_digest()[:12]}
+
+
+def _task(folder: str, ours: dict[str, str]) -> Callable[[bytes], Measurement]:
+    """What a worker does with a block. It is sent by value, and looks at the versions before it opens the block.
+
+    Args:
+        folder: of the driver, where relative paths begin.
+        ours: the driver's software.
+    """
+
+    def measure(sent: bytes) -> Measurement:
+        import pickle
+        import socket
+
+        try:
+            from wsn_env.evaluation.ray_engine import join_driver, measure_block
+        except ImportError as problem:
+            node = f"the node {socket.gethostname()} has another wsn_env, or none ({problem})"
+            raise ValueError(f"engine 'ray': {node}: must be the same on every node") from None
+        join_driver(folder, ours)
+        return measure_block(pickle.loads(sent))
+
+    return measure
+
+
+def join_driver(folder: str, ours: dict[str, str]) -> None:
+    """On a worker: into the driver's folder, where relative paths begin, if there is one of that name.
+
+    Raises:
+        ValueError: this machine has another software than the driver's.
+    """
+    theirs = software()
+    other = [f"{name} {theirs.get(name)} instead of {ours[name]}" for name in ours if theirs.get(name) != ours[name]]
+    if other:
+        node = f"the node {socket.gethostname()} has {', '.join(other)}"
+        raise ValueError(f"engine 'ray': {node}: must be the same on every node")
+    if os.path.isdir(folder):
+        os.chdir(folder)
+
+
+def measure_block(block: Block) -> Measurement:
+    """What `rollout` measures, and the digests of what own code has read; an error there carries its place along."""
     module = type(block.policy).__module__
     watch(module)
-    return next(in_this_process(threads=1)([block]))[1], noted_files([module])
+    try:
+        return next(in_this_process(threads=1)([block]))[1], noted_files([module])
+    except Exception as problem:
+        problem.add_note(own_place(problem))  # tracebacks do not travel
+        raise

@@ -25,7 +25,9 @@ def versions() -> dict[str, str]:
 
 @cache
 def sources_digest() -> str:
-    """Of every source file of the package, tuned number and trained policy: what it says may have changed with any."""
+    """Of every source file of the package, tuned number and trained policy, wherever it is installed: any may have
+    changed what a result says."""
     folders = [Path(str(files(name))) for name in ("wsn_env", "wsn_env.agents")]
-    paths = sorted({path.resolve() for folder in folders for path in folder.rglob("*") if path.suffix in SOURCES})
-    return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).hexdigest()
+    paths = {path.resolve() for folder in folders for path in folder.rglob("*") if path.suffix in SOURCES}
+    digests = sorted(hashlib.sha256(path.read_bytes()).digest() for path in paths)
+    return hashlib.sha256(b"".join(digests)).hexdigest()

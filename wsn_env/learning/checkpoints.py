@@ -136,6 +136,16 @@ def _check_like(name: str, array: np.ndarray, kind: Any, shape: tuple[int, ...])
         raise ValueError(f"{name} is {array.dtype} of shape {array.shape}: must be {np.dtype(kind)} of shape {shape}")
 
 
+def check_finite(model: Any) -> None:
+    """Raise ValueError unless all weights of a model of stable-baselines3 are finite."""
+    if not all(bool(torch.isfinite(weights).all()) for weights in model.policy.parameters()):
+        rate, entropy = model.lr_schedule(1.0), model.ent_coef
+        raise ValueError(
+            f"training diverged after {model.num_timesteps:,} periods: its weights are not finite; take a smaller"
+            f" learning_rate than {rate:g} (or entropy than {entropy:g}) and begin anew"
+        )
+
+
 class Watch(BaseCallback):
     """Progress and checkpoints: one every `checkpoint_steps` and, by `save`, that of the last update.
 
@@ -170,6 +180,7 @@ class Watch(BaseCallback):
     def _take(self) -> None:
         model = self.model
         assert isinstance(model, PPO)
+        check_finite(model)
         self._taken = take_checkpoint(model)
 
     def _on_training_start(self) -> None:

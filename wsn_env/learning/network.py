@@ -83,6 +83,8 @@ class PolicyNetwork:
             shape = self.arrays[name].shape
             if len(shape) != len(axes) or any(self.sizes.setdefault(a, n) != n for a, n in zip(axes, shape)):
                 raise ValueError(f"network array {name} of shape {shape} does not fit its neighbours")
+            if 0 in shape:
+                raise ValueError(f"network array {name} of shape {shape} is empty")
             if not np.isfinite(self.arrays[name]).all():
                 raise ValueError(f"network array {name} has weights that are not finite")
 
@@ -102,11 +104,18 @@ class PolicyNetwork:
         from safetensors import SafetensorError
         from safetensors.numpy import load_file
 
+        if not Path(path).is_file():
+            raise ValueError(f"{path} is not a saved network: there is no such file")
         try:
             arrays = load_file(str(path))
+            other = {name: array.dtype for name, array in arrays.items() if array.dtype != F}
+            if other:
+                raise ValueError(f"its arrays must be float32: {next(iter(other))} is {next(iter(other.values()))}")
             return (EntryNetwork if "entry.weight" in arrays else FlatNetwork)(arrays)
-        except (OSError, SafetensorError, KeyError, ValueError) as problem:
-            raise ValueError(f"{path} is not a saved network, or it is cut short: {problem}") from None
+        except KeyError as problem:
+            raise ValueError(f"{path} is not a saved network: it lacks the array {problem}") from None
+        except (OSError, SafetensorError, ValueError, TypeError, AttributeError) as problem:  # bfloat16, float8
+            raise ValueError(f"{path} is not a saved network of float32, or it is cut short: {problem}") from None
 
 
 class FlatNetwork(PolicyNetwork):

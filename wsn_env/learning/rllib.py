@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from ray.rllib.utils.numpy import convert_to_numpy
 from ray.tune.registry import register_env
 
 from wsn_env.evaluation.progress import Progress
-from wsn_env.evaluation.ray_engine import connect
+from wsn_env.evaluation.ray_engine import connect, join_driver, send_own_code, software
 from wsn_env.learning.actor_critic import EntryActorCritic
 from wsn_env.learning.checkpoint_file import (
     pack,
@@ -138,7 +139,14 @@ class RayTraining:
         refuse_executable(folder / OLD_RAY_CHECKPOINT, self._path)
         saved = read_checkpoint(self._path, self._facts) if self._path.exists() else None
         connect(address)
-        register_env("wsn_env", lambda context: _OwnSeeds(make_rows(context["num_envs"]), seed))
+        send_own_code(ray)
+        here, ours = os.getcwd(), software()
+
+        def make(context: Any) -> gym.vector.VectorEnv:
+            join_driver(here, ours)
+            return _OwnSeeds(make_rows(context["num_envs"]), seed)
+
+        register_env("wsn_env", make)
         each = rows // max(runners, 1)
         batch = rollout * each * max(runners, 1)
         self._most = steps + batch

@@ -9,6 +9,7 @@ found again on disk while their code is the same, and never runs with a kind tha
 from __future__ import annotations
 
 import inspect
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cache, partial
@@ -62,6 +63,7 @@ class Kind(Section):
                 )
 
 
+_chosen: deque[Any] = deque(maxlen=20)
 _marked: dict[str, type[Kind]] = {}  # kinds by the mark in the type of their constants; of those alike, any
 
 
@@ -137,7 +139,13 @@ def _implementation(name: str, allocates: bool, quick: bool, constants: Any) -> 
     if kind.allocates != allocates:
         return None
     own = plain_function(getattr(kind, name))
+    _chosen.append(own)
     return _quick(own) if quick else own
+
+
+def chosen_codes() -> list[Any]:
+    """The code of the functions that kernels were last compiled with: where compiling fails, one of the last."""
+    return [function.__code__ for function in _chosen]
 
 
 def _kind_of(mark: str, name: str) -> type[Kind]:

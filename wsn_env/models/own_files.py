@@ -1,7 +1,7 @@
 """Which files a user's own code has read: code beside it, data. Results are kept for these files alone.
 
 An audit hook of Python's sees every file that is opened; those count that are opened, at whatever depth, by a module
-that is watched. Files that a library opens without Python (HDF5, safetensors) are not seen.
+whose package is watched. Files that a library opens without Python (HDF5, safetensors) are not seen.
 """
 
 from __future__ import annotations
@@ -22,21 +22,30 @@ from wsn_env.compiled.store import store_folder
 OF_FILES = "wsn_env_own_"  # so begin the names of modules that are files given by path
 IMPORTED = ""
 
-_read: dict[str, dict[Path, str]] = {IMPORTED: {}}  # digests of what was read, by watched module; of modules imported
+_read: dict[str, dict[Path, str]] = {IMPORTED: {}}  # digests of what was read, by watched package; of modules imported
 _stamps: dict[Path, tuple[tuple[int, ...], str]] = {}  # when a file was changed last, and its digest
 
 
 def watch(module: str) -> None:
-    """From now on note the files that a module opens, itself or through others."""
+    """From now on note the files that the modules of a module's package open, themselves or through others."""
     if len(_read) == 1:
         sys.addaudithook(_note)
-    _read.setdefault(module, {})
+    _read.setdefault(_package(module), {})
+
+
+def _package(module: str) -> str:
+    return module.partition(".")[0]
+
+
+def note_file(module: str, path: str | Path) -> None:
+    """Note a file for the package of a module, which is watched."""
+    _note_file(Path(path), [_read[_package(module)]])
 
 
 def note_modules() -> None:
     """Note the files of the modules that have been imported and are neither this package's nor installed.
 
-    Each counts as it was when noted first. Those given by path have names by their content.
+    Each counts as it was when noted first. Those given by path are noted as they are read.
     """
     for name, module in list(sys.modules.items()):
         file = getattr(module, "__file__", None)
@@ -45,15 +54,16 @@ def note_modules() -> None:
 
 
 def noted_files(modules: Iterable[str]) -> dict[str, str]:
-    """Digests, by path, of what these modules have read, and of the modules noted."""
-    return {str(path): digest for name in (IMPORTED, *modules) for path, digest in _read.get(name, {}).items()}
+    """Digests, by path, of what the packages of these modules have read, and of the modules noted."""
+    packages = IMPORTED, *map(_package, modules)
+    return {str(path): digest for name in packages for path, digest in _read.get(name, {}).items()}
 
 
 def add_noted(module: str, files: dict[str, str]) -> None:
     """Add what a module has read in another process."""
     watch(module)
     for name, digest in files.items():
-        _read[module].setdefault(Path(name), digest)
+        _read[_package(module)].setdefault(Path(name), digest)
 
 
 def _note_file(path: Path, notes: Iterable[dict[Path, str]]) -> None:
@@ -100,8 +110,8 @@ def _note(event: str, arguments: tuple[Any, ...]) -> None:
         name = str(frame.f_globals.get("__name__"))
         if name == __name__ or name.startswith("wsn_env.evaluation."):  # which reads for itself, and calls the others
             break
-        if name in _read:
-            notes[name] = _read[name]
+        if (package := _package(name)) in _read:
+            notes[package] = _read[package]
         frame = frame.f_back
     if notes:
         try:

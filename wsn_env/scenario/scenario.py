@@ -54,13 +54,16 @@ BY_NAME: dict[str, Registry] = {
 }
 
 
+MOST_LAM = 1e9  # m/mJ: observations and rewards are float32
+
+
 @dataclass(frozen=True)
 class Scenario(Section):
     """Everything about a simulated network. `Scenario.named(id)` gives a published system's."""
 
     name: str = "PreDC-v0"
     periods: int = quantity(100, "horizon of an episode", at_least=1, whole=True)
-    period_s: float = quantity(1.0, "sampling period T", above=0, at_most=3600)
+    period_s: float = quantity(1.0, "sampling period T", at_least=1e-6, at_most=3600)
     lam: float | tuple[float, float] = 4.0  # m/mJ; a pair (low, high): drawn log-uniformly for each episode
     typical_error_m: float = quantity(1.0, "error of a good schedule: the scale of a learner's rewards", above=0)
     typical_energy_mj: float = quantity(0.3, "its energy in a period", above=0)
@@ -100,8 +103,10 @@ class Scenario(Section):
             raise ScenarioError(f"Scenario.unscored = {self.unscored}: must be 0 with ends_outside = True")
         self._check_tracker()
         low, high = self.lam_range
-        if not (np.isfinite([low, high]).all() and 0 <= low <= high) or (low == 0) != (high == 0):
-            raise ScenarioError(f"Scenario.lam = {self.lam!r}: must be at least 0 m/mJ, or a pair 0 < low <= high")
+        if not (np.isfinite([low, high]).all() and 0 <= low <= high <= MOST_LAM) or (low == 0) != (high == 0):
+            raise ScenarioError(
+                f"Scenario.lam = {self.lam!r}: must be at least 0 m/mJ, or a pair 0 < low <= high, up to {MOST_LAM:g}"
+            )
         for kind in (self.detection, self.measurement, self.radio):
             kind.check(self)
         self.motion.check_measurement(self.measurement)
@@ -242,7 +247,9 @@ class Scenario(Section):
                 try:
                     whole[name] = kind(**given)
                 except TypeError:
-                    strange = next(key for key in given if key not in own)
+                    strange = next((key for key in given if key not in own), None)
+                    if strange is None:  # the kind's own mistake
+                        raise
                     raise UnknownQuantity(kind.__name__, strange, own) from None
         for item in fields(self):
             if item.name in changes:

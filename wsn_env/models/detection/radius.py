@@ -60,12 +60,12 @@ class Detection(DetectionRule):
     with a1 = d - (1 - delta) r and a2 = (1 + delta) r - d. Xiang & Guo (2013), eqs. 2-3.
     """
 
-    radius_m: float = quantity(10.0, "sensing radius r_s", above=0)
+    radius_m: float = quantity(10.0, "sensing radius r_s", above=0, at_most=100_000)
     softness: float = quantity(0.2, "delta: half width of the soft edge, in radii", above=0, at_most=1)
     decay: float = quantity(1.0, "lambda1", at_least=0)
     ceiling: float = quantity(0.6, "lambda2: probability well inside the radius", above=0, at_most=1)
-    decay_power: float = quantity(3.0, "beta1", above=0)
-    edge_power: float = quantity(2.0, "beta2", above=0)
+    decay_power: float = quantity(3.0, "beta1", above=0, at_most=50)
+    edge_power: float = quantity(2.0, "beta2", above=0, at_most=50)
 
     allocates: ClassVar[bool] = False
 

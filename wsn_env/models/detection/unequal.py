@@ -28,7 +28,7 @@ class UnequalRadii(DetectionRule):
     is what is known of a node whose radius is not.
     """
 
-    radius_m: float = quantity(10.0, "mean sensing radius r", above=0)
+    radius_m: float = quantity(10.0, "mean sensing radius r", above=0, at_most=100_000)
     radius_spread: float = quantity(0.1, "s: half width of the nodes' radii, in mean radii", at_least=0, below=1)
     radii_known: bool = quantity(
         False,

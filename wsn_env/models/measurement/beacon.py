@@ -41,20 +41,22 @@ class Beacon(Measurement):
     exponents: float | tuple[float, ...] = 1.7  # n
     heights_m: float | tuple[float, ...] = 0.0  # of the receivers
     beacon_m: float = quantity(0.0, "height of the beacon", at_least=0, at_most=1000)
-    floor_m: float = quantity(0.1, "nearer than this the level grows no more", above=0)
-    field_db: float = quantity(2.24, "sd of the static field", at_least=0)
-    field_m: float = quantity(0.8, "its correlation length", above=0)
-    drift_db: float = quantity(2.02, "sd of the drift", at_least=0)
-    drift_s: float = quantity(7.0, "its time constant", above=0)
-    main_db: float = quantity(1.8, "white part: mean of the upper component")
-    main_sd_db: float = quantity(2.9, "its sd", at_least=0)
+    floor_m: float = quantity(0.1, "nearer than this the level grows no more", at_least=1e-6, at_most=1e6)
+    field_db: float = quantity(2.24, "sd of the static field", at_least=0, at_most=1000)
+    field_m: float = quantity(0.8, "its correlation length", at_least=1e-6, at_most=1e6)
+    drift_db: float = quantity(2.02, "sd of the drift", at_least=0, at_most=1000)
+    drift_s: float = quantity(7.0, "its time constant", at_least=1e-6, at_most=1e9)
+    main_db: float = quantity(1.8, "white part: mean of the upper component", at_least=-1000, at_most=1000)
+    main_sd_db: float = quantity(2.9, "its sd", at_least=0, at_most=1000)
     fade_share: float = quantity(0.4, "weight of the lower component", at_least=0, at_most=1)
-    fade_db: float = quantity(-2.7, "its mean")
-    fade_sd_db: float = quantity(4.5, "its sd", at_least=0)
+    fade_db: float = quantity(-2.7, "its mean", at_least=-1000, at_most=1000)
+    fade_sd_db: float = quantity(4.5, "its sd", at_least=0, at_most=1000)
     loss: float = quantity(0.146, "probability that a packet is lost", at_least=0, below=1)
     loss_after_loss: float = quantity(0.216, "the same after a lost one", at_least=0, below=1)
     interval_s: float = quantity(0.4525, "between packets", at_least=0.01, at_most=60)
-    bias_s: float = quantity(7.0, "time constant of the bias that the tracker takes field and drift for", above=0)
+    bias_s: float = quantity(
+        7.0, "time constant of the bias that the tracker takes field and drift for", at_least=1e-6, at_most=1e9
+    )
 
     temper: float = quantity(
         0.7,

@@ -58,7 +58,9 @@ class Binary(Measurement):
         whole=True,
     )
     flip: float = quantity(0.0, "probability that a node misreads its state in a period", at_least=0, below=0.5)
-    edge_m: float = quantity(1.0, "width of the edge of detection that the particle filter believes in", above=0)
+    edge_m: float = quantity(
+        1.0, "width of the edge of detection that the particle filter believes in", at_least=1e-6, at_most=1e6
+    )
 
     allocates: ClassVar[bool] = False
     reports_state: ClassVar[bool] = True

@@ -20,7 +20,7 @@ LN_10 = 2.302585092994046
 class Position(Measurement):
     """A node's own noisy position of the target: z = (x, y) + noise. Xiang & Guo (2013), eq. 7."""
 
-    noise_m: float = quantity(2.0, "sd of each coordinate", above=0)
+    noise_m: float = quantity(2.0, "sd of each coordinate", at_least=1e-3, at_most=1e9)
 
     allocates: ClassVar[bool] = False
     gaussian: ClassVar[bool] = True

@@ -14,10 +14,10 @@ from wsn_env.models.quantity import quantity
 class Rssi(Level):
     """Received strength in dB: reference - 10 n log10(max(d, floor)) + noise (eq. 1 in its log-distance form)."""
 
-    reference_dbm: float = quantity(-40.0, "level at 1 m")
-    exponent: float = quantity(2.5, "path loss exponent n", above=0)
-    noise_db: float = quantity(3.0, "sd", above=0)
-    floor_m: float = quantity(1.0, "nearer than this the level grows no more", above=0)
+    reference_dbm: float = quantity(-40.0, "level at 1 m", at_least=-1e6, at_most=1e6)
+    exponent: float = quantity(2.5, "path loss exponent n", above=0, at_most=1000)
+    noise_db: float = quantity(3.0, "sd", at_least=1e-6, at_most=1e9)
+    floor_m: float = quantity(1.0, "nearer than this the level grows no more", at_least=1e-6, at_most=1e6)
 
     @property
     def at_1m_db(self) -> float:

@@ -11,7 +11,7 @@ from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import F, exp, exp32, log, log32
 from wsn_env.compiled.kernels import lean_piece
 from wsn_env.models.measurement.base import Line, Measurement, Occasion, PositionBelief, sample
-from wsn_env.models.quantity import quantity
+from wsn_env.models.quantity import ScenarioError, quantity
 
 if TYPE_CHECKING:
     from wsn_env.scenario import Scenario
@@ -24,17 +24,28 @@ def power(m: Any, squared: float) -> float:
     return m.amplitude * exp(-(m.slope * log(near)))
 
 
+MOST_RATIO = 1e18  # of the amplitude to the noise
+
+
 @dataclass(frozen=True)
 class RssiPower(Measurement):
     """Received power: a max(d, floor)^-beta + noise (eq. 1 as printed, 2 <= beta <= 4)."""
 
-    amplitude: float = quantity(100.0, "power a at 1 m, in any unit", above=0)
+    amplitude: float = quantity(100.0, "power a at 1 m, in any unit", at_least=1e-30, at_most=1e15)
     exponent: float = quantity(2.0, "beta", at_least=2, at_most=4)
-    noise: float = quantity(0.2, "sd, in the same unit", above=0)
-    floor_m: float = quantity(1.0, "nearer than this the power grows no more", above=0)
+    noise: float = quantity(0.2, "sd, in the same unit", at_least=1e-30, at_most=1e15)
+    floor_m: float = quantity(1.0, "nearer than this the power grows no more", at_least=1e-6, at_most=1e6)
 
     allocates: ClassVar[bool] = False
     gaussian: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.amplitude <= MOST_RATIO * self.noise:
+            least = self.amplitude / MOST_RATIO
+            raise ScenarioError(
+                f"RssiPower.noise = {self.noise}: must be at least {least:g}, amplitude / {MOST_RATIO:g}"
+            )
 
     @property
     def fingerprint_unit(self) -> float:

@@ -21,11 +21,11 @@ class Sonar(Level):
     customary middle. The source's 120 dB are an assumption of ours.
     """
 
-    source_db: float = quantity(120.0, "source level at 1 m, dB re 1 uPa")
-    spreading: float = quantity(1.5, "k", above=0)
+    source_db: float = quantity(120.0, "source level at 1 m, dB re 1 uPa", at_least=-1e6, at_most=1e6)
+    spreading: float = quantity(1.5, "k", above=0, at_most=1000)
     frequency_khz: float = quantity(10.0, "f", at_least=0.4, at_most=1000)
-    noise_db: float = quantity(3.0, "sd of a measured level", above=0)
-    floor_m: float = quantity(1.0, "nearer than this the level grows no more", above=0)
+    noise_db: float = quantity(3.0, "sd of a measured level", at_least=1e-6, at_most=1e9)
+    floor_m: float = quantity(1.0, "nearer than this the level grows no more", at_least=1e-6, at_most=1e6)
 
     @property
     def at_1m_db(self) -> float:

@@ -30,7 +30,9 @@ class Crossing(Motion):
     fitting_q: ClassVar[float] = 0.05
     margin_m: float = quantity(10.0, "end points keep this distance from the border", at_least=0)
     crossing_m: float = quantity(40.0, "least distance between the end points", above=0)
-    acceleration_ms2: float = quantity(0.025, "sd of the white acceleration on the track (q/2)", at_least=0)
+    acceleration_ms2: float = quantity(
+        0.025, "sd of the white acceleration on the track (q/2)", at_least=0, at_most=1000
+    )
 
     @property
     def process_noise_ms2(self) -> float | None:

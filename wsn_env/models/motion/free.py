@@ -28,7 +28,7 @@ class Free(Motion):
     fitting_q: ClassVar[float] = 0.025
     spread_m: float = quantity(8.0, "sd of the start about the field's middle, along each axis", above=0)
     speed_ms: float = quantity(0.15, "sd of the velocity at the start, along each axis", above=0)
-    acceleration_ms2: float = quantity(0.025, "sd of the white acceleration on the track (q)", at_least=0)
+    acceleration_ms2: float = quantity(0.025, "sd of the white acceleration on the track (q)", at_least=0, at_most=1000)
 
     @property
     def process_noise_ms2(self) -> float | None:

@@ -65,7 +65,11 @@ class Modem(Link):
         return self.sleep_w * period_s
 
     def check(self, scenario: Scenario) -> None:
-        """A report must arrive within a period."""
+        """A report must arrive within a period, and an awake node must not take less than a sleeping one."""
+        if self.sleep_w > self.listen_w:
+            raise ScenarioError(
+                f"Modem.sleep_w = {self.sleep_w}: must be at most listen_w = {self.listen_w}, that of an awake node"
+            )
         if scenario.period_s < self.report_s:
             raise ScenarioError(
                 f"Scenario.period_s = {scenario.period_s}: must be at least {self.report_s:.3g} s, until a report of"
