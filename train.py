@@ -146,9 +146,9 @@ class Training:
         return self.runs / (self.name or self.scenario + single)
 
 
-def main() -> int:
+def main(arguments: list[str] | None = None) -> int:
     """Run; bad input is one line and exit status 2, Ctrl-C leaves a checkpoint and is 130."""
-    settings = tyro.cli(Training, description=__doc__)
+    settings = tyro.cli(Training, args=arguments, description=__doc__)
     try:
         train(settings)
     except (ValueError, OSError, MemoryError) as problem:
@@ -192,13 +192,11 @@ def train(settings: Training) -> None:
 def complete_settings(settings: Training) -> Scenario:
     """Fill in what was left out, by scenario, and return that."""
     if settings.tracks and Scenario.named(settings.scenario).measurement.lasting_errors:
-        raise ValueError(
-            f"train.py: tracks: {settings.scenario} is trained in its simulated form; wsn evaluate replays"
-        )
+        raise ValueError(f"Training.tracks: {settings.scenario} is trained in its simulated form; wsn evaluate replays")
     scenario = make_scenario(settings.scenario, settings.set, settings.tracks)
     settings.lam = settings.lam or list(scenario.lam_span)
     if len(settings.lam) > 2:
-        raise ValueError(f"train.py: lam = {settings.lam}: must be one number, or two that it is drawn between")
+        raise ValueError(f"Training.lam = {settings.lam}: must be one number, or two that it is drawn between")
     if settings.order is None:
         settings.order = default_order(scenario)
     if settings.level is None:
@@ -288,33 +286,33 @@ def make_envs(settings: Training, scenario: Scenario, interface: Settings, rows:
 def check_settings(settings: Training) -> None:
     """Refuse now what would fail after the training."""
     for name in "steps rows rollout batch epochs torch_threads checkpoint_steps".split():
-        check_quantity("train.py", name, getattr(settings, name), at_least=1, whole=True)
-    check_quantity("train.py", "batch", settings.batch, at_least=2)  # advantages are normalised by its sd
+        check_quantity("Training", name, getattr(settings, name), at_least=1, whole=True)
+    check_quantity("Training", "batch", settings.batch, at_least=2)  # advantages are normalised by its sd
     for name in ("gamma", "gae_lambda", "level"):
-        check_quantity("train.py", name, getattr(settings, name), at_least=0, at_most=1)
-    check_quantity("train.py", "learning_rate", settings.learning_rate, above=0, at_most=1)
-    check_quantity("train.py", "entropy", settings.entropy, at_least=0, at_most=100)
+        check_quantity("Training", name, getattr(settings, name), at_least=0, at_most=1)
+    check_quantity("Training", "learning_rate", settings.learning_rate, above=0, at_most=1)
+    check_quantity("Training", "entropy", settings.entropy, at_least=0, at_most=100)
     for name in ("units", "critic"):
         for units in getattr(settings, name):
-            check_quantity("train.py", name, units, at_least=1, at_most=4096, whole=True)
-    check_quantity("train.py", "torch_threads", settings.torch_threads, at_least=1, at_most=1024)
+            check_quantity("Training", name, units, at_least=1, at_most=4096, whole=True)
+    check_quantity("Training", "torch_threads", settings.torch_threads, at_least=1, at_most=1024)
     for name, hint in get_type_hints(Training).items():
         if get_origin(hint) is Literal and getattr(settings, name) not in get_args(hint):
             allowed = ", ".join(get_args(hint))
-            raise ValueError(f"train.py: {name} = {getattr(settings, name)!r}: must be one of {allowed}")
-    check_quantity("train.py", "runners", settings.runners, at_least=0, whole=True)
+            raise ValueError(f"Training.{name} = {getattr(settings, name)!r}: must be one of {allowed}")
+    check_quantity("Training", "runners", settings.runners, at_least=0, whole=True)
     shares = 1 if settings.engine == "local" else max(1, settings.runners)
     others = len(settings.vary or ())
     if settings.rows // shares <= others:
         least = shares * (others + 1)
-        raise ValueError(f"train.py: rows = {settings.rows}: must be at least {least}, one a scenario and runner")
+        raise ValueError(f"Training.rows = {settings.rows}: must be at least {least}, one a scenario and runner")
     if settings.engine == "ray" and settings.network != "entries":
-        raise ValueError(f"train.py: network = {settings.network!r}: the engine ray trains only 'entries'")
+        raise ValueError(f"Training.network = {settings.network!r}: the engine ray trains only 'entries'")
     if settings.address and settings.engine != "ray":
-        raise ValueError(f"train.py: address = {settings.address!r}: only with --engine ray")
+        raise ValueError(f"Training.address = {settings.address!r}: only with --engine ray")
     # Every seed that training may use lies below those of evaluations.
     most = FIRST_SEED - settings.steps - settings.rows
-    check_quantity("train.py", "seed", settings.seed, at_least=0, at_most=most, whole=True)
+    check_quantity("Training", "seed", settings.seed, at_least=0, at_most=most, whole=True)
     if settings.episodes:
         evaluation_seeds(settings.evaluation_seed, settings.episodes)
 

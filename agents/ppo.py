@@ -20,10 +20,12 @@ from wsn_env.envs.interface import Interface, Settings
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.policies import read_saved
 from wsn_env.learning.network import EntryNetwork, FlatNetwork, PolicyNetwork
+from wsn_env.models.own_files import file_digest
 from wsn_env.models.state import Cluster
 from wsn_env.simulation.view import View
 
 PRETRAINED = Path(__file__).parent / "pretrained"
+DIGEST = "sha256"  # of policy.safetensors
 INTERFACES = (("menu", "menu"), ("menu", "candidates"), ("subset", "candidates"))
 
 
@@ -33,6 +35,10 @@ class PPOPolicy(ViewPolicy):
     one that comes with the package for the scenario of this name."""
 
     path: str = ""
+
+    def __post_init__(self) -> None:
+        """Read the files now: a missing one is known before anybody plays."""
+        _ = self._interface_and_network
 
     def __repr__(self) -> str:
         """Tells it from others by what it has learned."""
@@ -61,7 +67,10 @@ class PPOPolicy(ViewPolicy):
             interface = Interface(self.scenario, settings)
         except (TypeError, ValueError) as problem:
             raise ValueError(f"{path} is not a saved policy: {problem}") from None
-        network = PolicyNetwork.load(path.with_suffix(".safetensors"))
+        weights = path.with_suffix(".safetensors")
+        network = PolicyNetwork.load(weights)
+        if read_saved(path, DIGEST) != file_digest(weights):
+            raise ValueError(f"{weights} is not the network that {path} was saved with: it is damaged, or another's")
         inputs, logits = interface.observation.space.shape[0], sum(_logit_counts(interface.action.space))
         if not network.fits(inputs, logits):
             raise ValueError(f"{path}: its network does not map {inputs} numbers to {logits}, as the environment wants")
@@ -95,6 +104,7 @@ def save_policy(folder: str | Path, network: PolicyNetwork, settings: Settings, 
     folder = Path(folder)
     with replacing(folder / "policy.safetensors") as path:
         network.save(path)
+    said = {"kind": "ppo", "interface": asdict(settings), DIGEST: file_digest(folder / "policy.safetensors")}
     with replacing(folder / "policy.json") as path:
-        path.write_text(json.dumps({"kind": "ppo", "interface": asdict(settings)} | facts, indent=1))
+        path.write_text(json.dumps(said | facts, indent=1))
     return folder / "policy.json"

@@ -88,6 +88,19 @@ def test_what_own_code_reads_decides_and_nothing_else(when, tmp_path, played):
     assert run_again(played, tmp_path / "out", policy) == (changed, 0)
 
 
+def test_two_files_that_share_a_third_are_both_played_again(tmp_path, played):
+    for name in ("first", "second"):
+        (tmp_path / f"{name}.py").write_text(OWN + "import shared\nclass P(Base):\n    def n(self): return shared.N")
+    (tmp_path / "shared.py").write_text("N = 1")
+    for name in ("first", "second"):
+        policy = [f"{tmp_path / name}.py:P"]
+        assert [run_again(played, tmp_path / name, policy)[1] for _ in range(2)] == [1, 0]
+    (tmp_path / "shared.py").write_text("N = 7")
+    for name in ("first", "second"):
+        rows, count = run_again(played, tmp_path / name, [f"{tmp_path / name}.py:P"])
+        assert count == 1 and rows[0]["members"] > 2
+
+
 def test_files_of_one_name_are_two_modules_and_an_edited_one_is_read_again(tmp_path, played):
     for folder, n in (("a", 1), ("b", 7)):
         (tmp_path / folder).mkdir()

@@ -74,7 +74,8 @@ def check_quantity(  # noqa: PLR0913
     )
     if not good:
         bounds = (("above", above), ("at least", at_least), ("at most", at_most), ("below", below))
-        rules = " and ".join(f"{words} {bound}" for words, bound in bounds if bound is not None)
+        given = [(words, bound) for words, bound in bounds if bound is not None]
+        rules = " and ".join(f"{words} {bound if isinstance(bound, int) else f'{bound:g}'}" for words, bound in given)
         kind = "a whole number" if whole else "a finite number"
         raise ScenarioError(f"{owner}.{name} = {value!r:.80}: must be {kind} {rules}".rstrip())
 

@@ -1,0 +1,1 @@
+"""What happens when things go wrong: bad input, hostile files, kills, long runs. Renews docs/reliability.md."""
