@@ -285,10 +285,10 @@ def run_reproduce(command: Reproduce) -> None:
 
 def run_compile(command: Compile) -> None:
     """`wsn compile`."""
-    from wsn_env.compiled.store import store_folder
-    from wsn_env.evaluation.progress import progress_bar
+    from wsn_env.compiled.store import check_store, store_folder
     from wsn_env.evaluation.warm_up import compile_everything
 
+    check_store()
     started = time.perf_counter()
     with progress_bar() as report:
         count = compile_everything(report)
