@@ -40,6 +40,29 @@ def test_a_comparison_leaves_the_same_files_whatever_the_terminal(tmp_path):
     assert status == 0 and others == files
 
 
+@pytest.mark.parametrize("after", [["-m", "wsn_env", "--help"], ["train.py", "--help"]], ids=["wsn", "train"])
+def test_help_is_shown_where_only_ascii_is(after):
+    ascii_only = {name: value for name, value in HOSTILE.items() if name.startswith(("LC", "PYTHON"))}
+    done = subprocess.run([sys.executable, *after], cwd=ROOT, env=os.environ | ascii_only, capture_output=True)
+    assert done.returncode == 0 and b"usage: " in done.stdout and not done.stderr, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("shell", "status", "said"),
+    [
+        ('exec "$@" >/dev/full', 2, "wsn: [Errno 28] No space left on device\n"),
+        ('"$@" | true; exit ${PIPESTATUS[0]}', 1, ""),
+    ],
+    ids=["full", "pipe"],
+)
+def test_results_are_there_where_the_table_cannot_be_printed(tmp_path, shell, status, said):
+    (found, printed, told), files = play(tmp_path / "run", "bash", "-c", shell, "bash")
+    assert (found, printed, told) == (status, "", said)
+    assert {f"out/{name}" for name in ("evaluation.csv", "evaluation.json", "evaluation.md", "report.html")} <= set(
+        files
+    )
+
+
 def calls_without_encoding(path: Path) -> list[str]:
     """Files opened as text by a call that does not say how it is encoded: Windows would take what it likes."""
     found = []
