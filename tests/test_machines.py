@@ -14,6 +14,9 @@ COMMAND = """-m wsn_env evaluate --policies nearest2 b=pre_dc --episodes 2 --lam
 PLAIN = {"PYTHONIOENCODING": "", "LC_ALL": "C.UTF-8"}
 HOSTILE = dict(LC_ALL="C", PYTHONUTF8="0", PYTHONCOERCECLOCALE="0", PYTHONIOENCODING="ascii", COLUMNS="40", LINES="5")
 HOSTILE |= dict(TERM="dumb", NO_COLOR="1", TZ="Asia/Kathmandu", MPLBACKEND="bogus", PYTHONOPTIMIZE="2")
+INTERPRETED = sorted(
+    str(path) for path in (ROOT / "tests").glob("test_*.py") if "mark.interpreted" in path.read_text("utf-8")
+)
 
 
 def play(folder, *before, without=(), after=COMMAND, **environment):
@@ -138,3 +141,23 @@ def test_a_comparison_runs_where_open_files_cannot_be_replaced(tmp_path):
     assert status == 0, said
     files.pop("out/.wsn.lock", None)  # open when its run ends: it stays
     assert files == play(tmp_path / "plain")[1]
+
+
+def test_marked_tests_pass_without_compiled_kernels():
+    """NUMBA_DISABLE_JIT=1 pytest -m interpreted: with its help people debug, and measure coverage."""
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "-m",
+        "interpreted",
+        "-W",
+        "error",
+        *INTERPRETED,
+    ]
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTEST_ADDOPTS": ""}
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0 and " passed" in done.stdout, done.stdout

@@ -100,6 +100,15 @@ def test_the_source_archive_holds_what_tests_and_documents_need(built):
     assert not wanted - built.source
 
 
+def test_the_source_archive_holds_every_file_of_the_repository(built):
+    """Those of the folders and on top; but for what only git and the continuous integration read."""
+    if not (ROOT / ".git").exists():
+        pytest.skip("no git checkout")
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True).stdout
+    wanted = {name for name in listed.decode().split("\0") if name and not name.startswith(".")}
+    assert len(wanted) > 300 and not {name for name in wanted if (ROOT / name).exists()} - built.source
+
+
 @pytest.mark.parametrize("own", ["agents/__init__.py", "agents.py"])
 def test_a_working_folder_may_hold_agents_of_its_own(own, built, tmp_path):
     """The wheel before everything else on the path, and then the working folder, as in `python -m`."""
