@@ -12,9 +12,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+from packaging.version import Version
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+FOR_USERS = "train plot front render ray".split()  # extras
+COMPANIONS = {"pyparsing"}  # in constraints-lowest.txt for the sake of another
 LEFT_OUT = (".*", "build", "dist", "out", "runs", "results", "_generated", "__pycache__", "*.egg-info")
 BUILD = "import sys; from setuptools import build_meta; getattr(build_meta, 'build_' + sys.argv[1])(sys.argv[2])"
 
@@ -77,6 +82,21 @@ def test_entry_points_name_what_there_is():
     points = PROJECT["project"]["entry-points"]["wsn_env.policies"] | PROJECT["project"]["scripts"]
     for module in (point.partition(":")[0].split(".") for point in points.values()):
         assert module[0] == "wsn_env" and (files[module[1]] / f"{module[-1]}.py").exists()
+
+
+def test_the_lowest_versions_declared_are_those_tried():
+    """But torch's, for which stable-baselines3 has a bound."""
+    lines = (ROOT / "constraints-lowest.txt").read_text(encoding="utf-8").splitlines()
+    pins = [Requirement(line.partition("#")[0]) for line in lines if line.partition("#")[0]]
+    tried = {canonicalize_name(pin.name): str(pin.specifier).removeprefix("==") for pin in pins}
+    extras = PROJECT["project"]["optional-dependencies"]
+    texts = [*PROJECT["project"]["dependencies"], *(text for name in FOR_USERS for text in extras[name])]
+    declared = {}
+    for requirement in (Requirement(text) for text in texts if text != "torch"):
+        low = [bound.version for bound in requirement.specifier if bound.operator == ">="]
+        assert len(low) == 1, f"{requirement}: no lower bound"
+        declared.setdefault(canonicalize_name(requirement.name), set()).add(Version(low[0]))
+    assert declared == {name: {Version(version)} for name, version in tried.items() if name not in COMPANIONS}
 
 
 def test_an_installation_claims_one_name(built):
