@@ -49,6 +49,7 @@ from wsn_env.reports.pages.evaluation_page import write_report
 from wsn_env.reports.pictures import write_picture
 from wsn_env.reports.plots import draw_comparison
 from wsn_env.reports.tables import print_tables, save_markdown
+from wsn_env.reports.terminal import NOBODY_READS, any_terminal
 from wsn_env.scenario import Scenario
 
 SIZED = ("nearest", "informed")  # compared with each of SIZES
@@ -148,9 +149,13 @@ class Training:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run; bad input is one line and exit status 2, Ctrl-C leaves a checkpoint and is 130."""
-    settings = tyro.cli(Training, args=arguments, description=__doc__)
+    settings = Training()
     try:
-        train(settings)
+        with any_terminal():
+            settings = tyro.cli(Training, args=arguments, description=__doc__)
+            train(settings)
+    except BrokenPipeError:
+        return NOBODY_READS
     except (ValueError, OSError, MemoryError) as problem:
         print(f"train.py: {own_place(problem)}{problem}", file=sys.stderr)
         return 2
@@ -375,11 +380,11 @@ def compare(settings: Training, scenario: Scenario, policies: dict[str, Policy],
         )
     evaluation.save(folder)
     save_markdown(evaluation, folder)
-    print_tables(evaluation, reference="ppo")
     write_picture(folder / "comparison.png", draw_comparison(evaluation, evaluation.middle_lam, emphasis="ppo"))
     with progress_bar() as report:
         page = write_report(folder, evaluation, policies, made, report)
     remove_kept_blocks(folder)
+    print_tables(evaluation, reference="ppo")
     print(f"written: {folder / 'evaluation.csv'}, {folder / 'comparison.png'}, {page}")
 
 

@@ -106,5 +106,5 @@ def save_policy(folder: str | Path, network: PolicyNetwork, settings: Settings, 
         network.save(path)
     said = {"kind": "ppo", "interface": asdict(settings), DIGEST: file_digest(folder / "policy.safetensors")}
     with replacing(folder / "policy.json") as path:
-        path.write_text(json.dumps(said | facts, indent=1))
+        path.write_text(json.dumps(said | facts, indent=1), encoding="utf-8")
     return folder / "policy.json"

@@ -28,4 +28,4 @@ def nearest_lam(lams: npt.ArrayLike, lam: npt.ArrayLike) -> np.ndarray:
 
 @cache
 def _load_table() -> dict[str, Any]:
-    return json.loads(TABLE.read_text())["scenarios"]
+    return json.loads(TABLE.read_text(encoding="utf-8"))["scenarios"]

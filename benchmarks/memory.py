@@ -99,7 +99,7 @@ def print_growth(particles: int, nodes: int, rows: int) -> None:
     world = _world(particles, nodes)
     kept = [_run(world, 2)]  # not freed: what comes could settle in its place, unseen
     before = resident_bytes("VmRSS")
-    CLEAR.write_text("5")  # the peak begins anew
+    CLEAR.write_text("5", encoding="utf-8")  # the peak begins anew
     kept.append(_run(world, rows))
     print(resident_bytes("VmHWM") - before)
 
@@ -120,7 +120,7 @@ def _run(world: World, rows: int) -> State:
 
 def resident_bytes(name: str) -> int:
     """VmRSS, now; VmHWM, at its peak."""
-    for line in STATUS.read_text().splitlines():
+    for line in STATUS.read_text(encoding="utf-8").splitlines():
         if line.startswith(f"{name}:"):
             return 1024 * int(line.split()[1])
     raise OSError(f"{STATUS} has no {name}")

@@ -37,9 +37,9 @@ def renew_page(folder: Path = RESULTS, page: Path = PAGE) -> None:
         raise SystemExit(f"no results in {folder}: run python -m benchmarks")
     for plot in make_plots(results).values():
         draw(plot, page.with_name(f"performance_{plot.name}.svg"))
-    text = renew_blocks(page.read_text(), results)
+    text = renew_blocks(page.read_text(encoding="utf-8"), results)
     with replacing(page) as temporary:
-        temporary.write_text(text)
+        temporary.write_text(text, encoding="utf-8")
 
 
 def _place(result: Result) -> tuple[int, str]:

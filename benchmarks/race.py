@@ -211,12 +211,12 @@ class Result:
         path.parent.mkdir(parents=True, exist_ok=True)
         claims = [asdict(claim) | {"holds": claim.holds} for claim in self.claims]
         with replacing(path) as temporary:
-            temporary.write_text(json.dumps(asdict(self) | {"claims": claims}, indent=1) + "\n")
+            temporary.write_text(json.dumps(asdict(self) | {"claims": claims}, indent=1) + "\n", encoding="utf-8")
 
     @classmethod
     def load(cls, path: Path) -> Result:
         """From JSON."""
-        values = json.loads(Path(path).read_text())
+        values = json.loads(Path(path).read_text(encoding="utf-8"))
         claims = [Claim(**{key: value for key, value in claim.items() if key != "holds"}) for claim in values["claims"]]
         tables, plots = [Table(**table) for table in values["tables"]], [Plot(**plot) for plot in values["plots"]]
         return cls(**values | {"claims": claims, "tables": tables, "plots": plots})
@@ -269,7 +269,7 @@ def _processor() -> str:
 
 def _read(path: str) -> str:
     try:
-        return Path(path).read_text()
+        return Path(path).read_text(encoding="utf-8")
     except OSError:
         return ""
 

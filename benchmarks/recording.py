@@ -25,7 +25,7 @@ NEEDED = (0, 3, 4, 5, 6)  # time, level, x, y, z
 
 def by_csv(path: Path) -> np.ndarray:
     """(N, 5) by the standard library."""
-    with open(path, newline="") as file:
+    with open(path, newline="", encoding="utf-8") as file:
         return np.array([[float(row[k]) for k in NEEDED] for row in csv.reader(file)])
 
 

@@ -45,7 +45,7 @@ class Settings:
 
 def needs(script: Path) -> list[str]:
     """What a script asks for in its first lines; [] where it does not."""
-    block = BLOCK.match(script.read_text())
+    block = BLOCK.match(script.read_text(encoding="utf-8"))
     return tomllib.loads(block[1].replace("# ", ""))["dependencies"] if block else []
 
 
@@ -93,7 +93,7 @@ def environment(script: Path, settings: Settings) -> Path:
     folder = (settings.out / script.stem).absolute()
     python, ready = folder / "bin" / "python", folder / "ready"
     wanted = "\n".join(needs(script))
-    if not ready.exists() or ready.read_text() != wanted:
+    if not ready.exists() or ready.read_text(encoding="utf-8") != wanted:
         print(f"{script.stem}: installing {', '.join(needs(script))} ...", flush=True)
         own = [need.replace("wsn_env", str(ROOT)) for need in needs(script) if need.startswith("wsn_env")]
         others = [need for need in needs(script) if not need.startswith("wsn_env")]
@@ -104,14 +104,14 @@ def environment(script: Path, settings: Settings) -> Path:
             [*pip, TORCH, *others, "-e", *own],
         ):
             subprocess.run(command, check=True, capture_output=True, text=True)
-        ready.write_text(wanted)
+        ready.write_text(wanted, encoding="utf-8")
     return python
 
 
 def renew(rows: list[list[str]]) -> None:
     """Put the measured table into its page."""
     table = markdown_table(("example", "toolkit", "periods a second", "return"), rows, left=(0, 1))
-    PAGE.write_text(fill_blocks(PAGE.read_text(), {"examples": table}))
+    PAGE.write_text(fill_blocks(PAGE.read_text(encoding="utf-8"), {"examples": table}), encoding="utf-8")
     print(f"written: {PAGE}")
 
 

@@ -42,7 +42,7 @@ def main() -> int:
         settings.out.mkdir(parents=True, exist_ok=True)
         for track in tracks:
             points = positions(track)
-            with open(settings.out / f"{track.name}.csv", "w", newline="") as file:
+            with open(settings.out / f"{track.name}.csv", "w", newline="", encoding="utf-8") as file:
                 csv.writer(file).writerows([("t", "x", "y"), *points])
             print(f"{track.name}: {len(points)} positions in {points[-1][0]:.0f} s")
     except (DatasetError, OSError) as problem:

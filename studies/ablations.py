@@ -126,7 +126,7 @@ def train_variant(study: Study, job: Job) -> Path:
         done = subprocess.run([sys.executable, str(train), *settings], capture_output=True, text=True)
         if done.returncode:
             raise SystemExit(f"{job.variant}: train.py failed:\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
-        (folder / "said.txt").write_text(done.stdout)
+        (folder / "said.txt").write_text(done.stdout, encoding="utf-8")
     return folder
 
 
@@ -136,8 +136,10 @@ def evaluate_returns(study: Study, scenario: Scenario, folder: Path, lams) -> di
     if not path.exists():
         policy = PPOPolicy(scenario, path=str(folder / "policy.json"))
         evaluation = evaluate({"ppo": policy}, scenario, lams, study.episodes, seed=1)
-        path.write_text(json.dumps({lam: evaluation.values("ppo", lam, "return").tolist() for lam in lams}))
-    return {float(lam): np.array(values) for lam, values in json.loads(path.read_text()).items()}
+        path.write_text(
+            json.dumps({lam: evaluation.values("ppo", lam, "return").tolist() for lam in lams}), encoding="utf-8"
+        )
+    return {float(lam): np.array(values) for lam, values in json.loads(path.read_text(encoding="utf-8")).items()}
 
 
 if __name__ == "__main__":

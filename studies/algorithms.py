@@ -152,8 +152,11 @@ def train_and_play(study: Study, scenario: Scenario, name: str, seed: int) -> di
             {lam: round(float(values.mean()), 1) for lam, values in returns.items()},
         )
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps({lam: values.tolist() for lam, values in returns.items()} | {"seconds": seconds}))
-    kept = json.loads(path.read_text())
+        path.write_text(
+            json.dumps({lam: values.tolist() for lam, values in returns.items()} | {"seconds": seconds}),
+            encoding="utf-8",
+        )
+    kept = json.loads(path.read_text(encoding="utf-8"))
     return {float(lam): np.array(values) for lam, values in kept.items() if lam != "seconds"}
 
 

@@ -325,7 +325,7 @@ def main(arguments: list[str] | None = None) -> int:
     text = markdown_table(columns, rows)
     study.out.mkdir(parents=True, exist_ok=True)
     with replacing(study.out / "bound.md") as path:
-        path.write_text(text)
+        path.write_text(text, encoding="utf-8")
     print(text)
     return 0
 

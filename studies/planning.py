@@ -86,7 +86,7 @@ def main(arguments: list[str] | None = None) -> None:
     print(text)
     settings.out.mkdir(parents=True, exist_ok=True)
     with replacing(settings.out / "planning.md") as path:
-        path.write_text(text)
+        path.write_text(text, encoding="utf-8")
 
 
 def table(found: Evaluation, lam: float, names: list[str], timed: dict[str, Timed]) -> str:

@@ -58,7 +58,7 @@ def save_table(out: Path, scenario, lams, results: dict[str, list[Returns]], usu
     }
     for suffix, content in (("md", text), ("json", json.dumps(means, indent=1))):
         with replacing(out / f"{scenario.name}.{suffix}") as path:
-            path.write_text(content)
+            path.write_text(content, encoding="utf-8")
 
 
 def learning_curve(folder: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -68,7 +68,7 @@ def learning_curve(folder: Path) -> tuple[np.ndarray, np.ndarray]:
     """
     rows = []
     for path in sorted(folder.glob("progress-*/progress.csv"), key=lambda path: int(path.parent.name.split("-")[1])):
-        with open(path) as file:
+        with open(path, encoding="utf-8") as file:
             rows += [[row[name] for name in CURVE] for row in csv.DictReader(file)]
     rows = [row for row in rows if all(row)]
     if not rows:

@@ -68,7 +68,7 @@ def main() -> int:
     parts = {"table": table(evaluation, list(trained)), "hypervolume": table_of_volumes(evaluation, trained)}
     for name, text in parts.items():
         with replacing(asked.out / f"{name}.md") as path:
-            path.write_text(text)
+            path.write_text(text, encoding="utf-8")
         print(text)
     remove_kept_blocks(asked.out)
     return 0

@@ -66,7 +66,7 @@ def main() -> int:
         rows.append([what, *format_cells(evaluation, list(trained))])
     text = markdown_table(["world", *(f"{lam:g}" for lam in lams)], rows)
     with replacing(asked.out / f"{usual.name}.md") as path:
-        path.write_text(text)
+        path.write_text(text, encoding="utf-8")
     for settings in worlds.values():
         remove_kept_blocks(world_folder(asked, settings))
     print(text)

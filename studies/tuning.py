@@ -141,7 +141,7 @@ def tune_greedy(trials: Trials) -> list[Terms]:
 def main(arguments: list[str] | None = None) -> None:
     """Tune and write the table."""
     settings = tyro.cli(Tuning, description=__doc__, args=arguments)
-    table = json.loads(settings.out.read_text()) if settings.out.exists() else {"scenarios": {}}
+    table = json.loads(settings.out.read_text(encoding="utf-8")) if settings.out.exists() else {"scenarios": {}}
     for name in settings.scenario:
         scenario = Scenario.named(name)
         with progress_bar() as report:
@@ -149,7 +149,7 @@ def main(arguments: list[str] | None = None) -> None:
         how = {"lams": sorted(settings.lams), "episodes": settings.episodes, "seed": settings.seed}
         table["scenarios"][scenario.name] = {"tuned_on": how} | found
         with replacing(settings.out) as path:
-            path.write_text(json.dumps(table, indent=1) + "\n")
+            path.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
         print(f"{scenario.name}: written to {settings.out}")
 
 

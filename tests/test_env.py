@@ -118,6 +118,7 @@ def test_sixty_four_rows_equal_sixty_four_environments(scenario):
             assert same(observation, batch_observation[i]) and reward == batch_reward[i]
 
 
+@pytest.mark.interpreted
 def test_reward_is_minus_error_and_energy():
     env = ClusterEnv(lam=2.5, **SMALL)
     env.reset(seed=3)

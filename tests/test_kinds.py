@@ -177,6 +177,7 @@ def _prices(rs, squared):
     return transmission(r, 512.0, squared), relayed(r, 512.0, squared), reception(r, 512.0)
 
 
+@pytest.mark.interpreted
 @pytest.mark.parametrize("name", RADIOS.kinds)
 def test_every_radio_has_prices_and_pays_them(name):
     scenario = Scenario.named("PreDC-v0", radio=name)

@@ -44,6 +44,7 @@ def near(joules):
     return pytest.approx(joules, rel=1e-12, abs=5e-11)
 
 
+@pytest.mark.interpreted
 def test_a_report_costs_the_same_at_any_distance():
     talk = Talk()
     first = talk.step(0, 1, 2)
@@ -77,6 +78,7 @@ def test_who_is_beyond_one_hop_is_dropped_and_counted():
     assert Talk(hop_m=99.0).step(0, 1, 2, 3).members[0] == 1
 
 
+@pytest.mark.interpreted
 def test_a_handover_beyond_one_hop_is_relayed_at_the_old_heads_expense():
     for hop_m, hops in ((260.0, 1), (250.0, 2), (100.0, 3)):
         talk = Talk(hop_m=hop_m)

@@ -142,6 +142,7 @@ def test_turns_are_as_frequent_as_wished_and_within_a_quarter_turn():
     assert abs(turn[turned].std() - np.pi / 12**0.5) < 4 * np.pi / 12**0.5 / turned.sum() ** 0.5
 
 
+@pytest.mark.interpreted
 def test_tracks_differ_from_key_to_key_and_repeat_with_it():
     for motion in ("crossing", "turns", "waypoint"):
         some = tracks(20, motion=motion)
@@ -260,6 +261,7 @@ def test_a_recorded_track_is_scaled_and_centred(write):
     np.testing.assert_allclose(small[:, 0], [0, 0, 100])
 
 
+@pytest.mark.interpreted
 def test_an_episode_picks_one_of_the_recordings_by_its_key(write):
     paths = [write(f"t,x,y\n0,{x},1\n1,{x},2\n", f"{x}.csv") for x in (10, 20, 30)]
     starts = recorded(*paths, count=600, span_m=None)[:, 0, 0]

@@ -12,9 +12,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+from packaging.version import Version
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+FOR_USERS = "train plot front render ray".split()  # extras
+COMPANIONS = {"pyparsing"}  # in constraints-lowest.txt for the sake of another
 LEFT_OUT = (".*", "build", "dist", "out", "runs", "results", "_generated", "__pycache__", "*.egg-info")
 BUILD = "import sys; from setuptools import build_meta; getattr(build_meta, 'build_' + sys.argv[1])(sys.argv[2])"
 
@@ -79,6 +84,21 @@ def test_entry_points_name_what_there_is():
         assert module[0] == "wsn_env" and (files[module[1]] / f"{module[-1]}.py").exists()
 
 
+def test_the_lowest_versions_declared_are_those_tried():
+    """But torch's, for which stable-baselines3 has a bound."""
+    lines = (ROOT / "constraints-lowest.txt").read_text(encoding="utf-8").splitlines()
+    pins = [Requirement(line.partition("#")[0]) for line in lines if line.partition("#")[0]]
+    tried = {canonicalize_name(pin.name): str(pin.specifier).removeprefix("==") for pin in pins}
+    extras = PROJECT["project"]["optional-dependencies"]
+    texts = [*PROJECT["project"]["dependencies"], *(text for name in FOR_USERS for text in extras[name])]
+    declared = {}
+    for requirement in (Requirement(text) for text in texts if text != "torch"):
+        low = [bound.version for bound in requirement.specifier if bound.operator == ">="]
+        assert len(low) == 1, f"{requirement}: no lower bound"
+        declared.setdefault(canonicalize_name(requirement.name), set()).add(Version(low[0]))
+    assert declared == {name: {Version(version)} for name, version in tried.items() if name not in COMPANIONS}
+
+
 def test_an_installation_claims_one_name(built):
     """A top-level `agents` would overwrite another project's (openai-agents has one), and `tests` anybody's."""
     tops = {name.split("/")[0] for name in built.installed}
@@ -98,6 +118,15 @@ def test_the_source_archive_holds_what_tests_and_documents_need(built):
     wanted |= {path.name for path in ROOT.iterdir() if path.suffix in (".md", ".py", ".toml", ".txt", ".in")}
     assert {"train.py", "tests/__init__.py", "tests/golden/frame.png", "docs/api.md", "MANIFEST.in"} <= wanted
     assert not wanted - built.source
+
+
+def test_the_source_archive_holds_every_file_of_the_repository(built):
+    """Those of the folders and on top; but for what only git and the continuous integration read."""
+    if not (ROOT / ".git").exists():
+        pytest.skip("no git checkout")
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True).stdout
+    wanted = {name for name in listed.decode().split("\0") if name and not name.startswith(".")}
+    assert len(wanted) > 300 and not {name for name in wanted if (ROOT / name).exists()} - built.source
 
 
 @pytest.mark.parametrize("own", ["agents/__init__.py", "agents.py"])

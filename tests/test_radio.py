@@ -61,6 +61,7 @@ def test_purposes_are_in_the_order_of_the_kernels():
     assert PURPOSES == ("sensing", "handover", "invitation", "report", "broadcast", "search")
 
 
+@pytest.mark.interpreted
 def test_a_report_over_ten_metres():
     talk = Talk()
     talk.step(0, 1)
@@ -81,6 +82,7 @@ def test_invitations_of_the_first_period():
     assert outcome.members[0] == 3
 
 
+@pytest.mark.interpreted
 def test_only_new_members_are_invited():
     talk = Talk()
     talk.step(0, 1, 2)
@@ -148,6 +150,7 @@ def test_sensing_is_charged_to_the_awake():
     assert outcome.spent_j[0, 2] == 0
 
 
+@pytest.mark.interpreted
 def test_a_search_wakes_everybody_at_the_receivers_cost():
     talk = Talk(start="search", search=True)
     fresh = talk.world.reset([0])
@@ -266,6 +269,7 @@ def test_a_sink_hears_reports_at_the_senders_price_only():
     assert not outcome.handover[0] and outcome.energy_j[0, HANDOVER] == 0
 
 
+@pytest.mark.interpreted
 def test_beacons_go_as_far_as_the_target_is_predicted_and_so_tell_nothing():
     talk = Talk(receiver="target", rows=2)
     predicted = talk.state.belief.predicted_mean.copy()
@@ -279,6 +283,7 @@ def test_beacons_go_as_far_as_the_target_is_predicted_and_so_tell_nothing():
     np.testing.assert_array_equal(elsewhere.spent_j, outcome.spent_j)
 
 
+@pytest.mark.interpreted
 def test_under_a_sink_a_cluster_outlives_its_head():
     """Its head is a node like the others; with a head that receives, the cluster ends with it."""
     for receiver, left in (("sink", (1, [2, 3])), ("head", (-1, []))):

@@ -97,6 +97,7 @@ def test_a_common_spread_moves_all_parents_copies_by_the_clouds_sds():
         np.testing.assert_allclose(own, np.sort([*[0] * (n - 2 * pairs), *range(1, pairs + 1), *range(-pairs, 0)]))
 
 
+@pytest.mark.interpreted
 def test_a_filter_spreads_alike():
     """The same copies as with systematic resampling, each moved along the sds of the cloud before."""
     chosen = dict(particles=500, filter_q=0.0, resample_below=1, noise_m=0.5)
@@ -124,6 +125,7 @@ def test_the_root_of_a_covariance(cov):
     np.testing.assert_allclose(lower @ lower.T, cov, atol=1e-6 * max(1.0, np.abs(cov).max()))
 
 
+@pytest.mark.interpreted
 def test_estimates_are_read_before_and_the_mean_is_kept():
     """One period of both filters from the same cloud, without process noise."""
     reports = [(0, 49.5, 49.0)]
@@ -187,6 +189,7 @@ def test_a_cloud_redrawn_has_the_mean_and_covariance_handed_over():
     assert (belief.log_weights == 0).all()
 
 
+@pytest.mark.interpreted
 def test_particles_are_redrawn_at_a_handover_only():
     places = ((40, 50), (60, 50))
     chosen = dict(positions=places, particles=200, filter_q=0.0, radius_m=1e-3, search=False)  # nobody detects

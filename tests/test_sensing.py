@@ -24,6 +24,7 @@ def test_detection_probability_with_table_1():
     assert p[4] == p[5] == 0
 
 
+@pytest.mark.interpreted
 @pytest.mark.parametrize(
     "detection",
     [

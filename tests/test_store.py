@@ -60,10 +60,10 @@ def edit(path, old, new):
     path.write_text(text.replace(old, new))
 
 
-def run(folder, *arguments, **environment):
+def run(folder, *arguments, before=(), **environment):
     """(stdout's words, stderr) of the module `work`, with kernels kept in a folder beside it."""
     kept = {"NUMBA_CACHE_DIR": str(folder / "kept"), "PYTHONDONTWRITEBYTECODE": "1"}
-    command = [sys.executable, *(arguments or ("work.py",))]
+    command = [*before, sys.executable, *(arguments or ("work.py",))]
     done = subprocess.run(command, cwd=folder, env=os.environ | kept | environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return done.stdout.split(), done.stderr
@@ -276,4 +276,83 @@ def test_a_store_that_cannot_be_written_is_done_without(folder):
     (folder / "file").write_text("")
     words, said = run(folder, NUMBA_CACHE_DIR=str(folder / "file"))
     assert words == ["6.0", "7.0", "first", "second"]
-    assert said.count("compiled kernels cannot be kept in") == 1
+    told = "wsn_env: compiling at every start, up to a minute: compiled kernels cannot be kept in"
+    why = "(Not a directory); set NUMBA_CACHE_DIR to a folder that can be written to"
+    assert said == f"{told} {folder / 'file'}/wsn_env {why}\n"
+
+
+def mounting(command):
+    """Before a command: a mount that it alone sees, for which one must be root."""
+    before = "unshare", "-m", "sh", "-c", f'{command} && exec "$@"', "sh"
+    try:
+        allowed = subprocess.run([*before, "true"], capture_output=True).returncode == 0
+    except FileNotFoundError:
+        allowed = False
+    if not allowed:
+        pytest.skip("nothing can be mounted here")
+    return before
+
+
+@pytest.mark.parametrize("kept", ["NUMBA_CACHE_DIR", "XDG_CACHE_HOME"])
+def test_a_store_on_a_disk_that_can_only_be_read_is_read(folder, kept):
+    """As an image of a container, or another user's."""
+    places = {"NUMBA_CACHE_DIR": "", kept: str(folder / "kept")}
+    run(folder, **places)
+    read_only = mounting(f"mount --bind -o ro {folder / 'kept'} {folder / 'kept'}")
+    assert run(folder, before=read_only, TMPDIR=str(folder), **places) == (["6.0", "7.0"], "")
+    assert not list(folder.glob("wsn_env-*"))
+    edit(folder / "numbers_of.py", "FACTOR = 3.0", "FACTOR = 4.0")
+    words, said = run(folder, before=read_only, **places)
+    assert words == ["8.0", "7.0", "first"]
+    assert said.count("\n") == 1 and "(Read-only file system); set NUMBA_CACHE_DIR" in said
+    for path in (folder / "kept").rglob("*.nb[ic]"):
+        path.unlink()
+    words, said = run(folder, before=read_only, **places)
+    assert words == ["8.0", "7.0", "first", "second"]
+    assert said.count("\n") == 1 and "cannot be kept in" in said
+
+
+def test_a_damaged_file_on_a_disk_that_can_only_be_read_is_compiled_anew(folder):
+    run(folder)
+    for path in (folder / "kept").rglob("*.nbc"):
+        path.write_bytes(path.read_bytes()[:-9])
+    words, said = run(folder, before=mounting(f"mount --bind -o ro {folder / 'kept'} {folder / 'kept'}"))
+    assert words == ["6.0", "7.0", "first", "second"]
+    assert said.count("is damaged") == 2 and said.count("cannot be kept in") == 1
+
+
+@pytest.mark.parametrize("room", ["4k", "24k", "40k"])
+def test_a_full_disk_is_done_without(folder, room):
+    (folder / "kept").mkdir()
+    words, said = run(folder, before=mounting(f"mount -t tmpfs -o size={room} none {folder / 'kept'}"))
+    assert words[:2] == ["6.0", "7.0"]
+    assert said.count("(No space left on device); set NUMBA_CACHE_DIR") == 1
+
+
+NO_HOME = """
+import pwd, runpy
+
+def nobody(number):
+    raise KeyError(number)
+
+pwd.getpwuid = nobody
+runpy.run_path("work.py", run_name="__main__")
+"""
+
+
+def test_a_user_without_home_is_told_that_kernels_cannot_be_kept(folder):
+    """A user who is only a number, as containers have; for the test, one who is not root."""
+    kept = {name: "" for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
+    no_disk = mounting("mount --bind -o ro / /")
+    words, said = run(folder, "-c", NO_HOME, before=("env", "-u", "HOME", *no_disk), **kept)
+    assert words == ["6.0", "7.0", "first", "second"]
+    assert said.count("\n") == 1 and "cannot be kept in /nonexistent/.cache/wsn_env/kernels (" in said
+
+
+def test_wsn_compile_says_at_once_that_kernels_cannot_be_kept(folder):
+    (folder / "file").write_text("")
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(folder / "file")}
+    done = subprocess.run([sys.executable, "-m", "wsn_env", "compile"], env=environment, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (2, "")
+    why = "(Not a directory); set NUMBA_CACHE_DIR to a folder that can be written to"
+    assert done.stderr == f"wsn: compiled kernels cannot be kept in {folder / 'file'}/wsn_env {why}\n"

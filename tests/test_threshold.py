@@ -36,6 +36,7 @@ def test_the_radius_is_where_the_mean_level_is_at_the_threshold(threshold_db, me
     assert norm.cdf((level(scenario.reach_m) - threshold_db) / 3) == pytest.approx(1e-6, rel=1e-3)
 
 
+@pytest.mark.interpreted
 @pytest.mark.parametrize("measurement", [Sonar(), Rssi(), Sonar(noise_db=0.01), Rssi(exponent=4, floor_m=5)])
 def test_detection_probability_is_the_normal_distributions(measurement):
     threshold = Threshold(measurement.mean_db(40.0))
@@ -115,6 +116,7 @@ def test_silence_weighs_like_plain_numpy(changes, weigh):
         np.testing.assert_allclose(again, 2 * weights, rtol=1e-6)  # added, not set
 
 
+@pytest.mark.interpreted
 @pytest.mark.parametrize("nodes", [[], [0], [2, 3]])
 def test_a_report_tells_by_its_value_and_silence_by_itself(nodes):
     """The head is node 2, the members are 0, 1 and 3, of which 1 has no energy."""

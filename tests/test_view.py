@@ -73,6 +73,7 @@ def test_what_a_policy_keeps_stays_what_it_was(scenario):
     keeper.check()
 
 
+@pytest.mark.interpreted
 @pytest.mark.parametrize("make", [ClusterEnv, lambda scenario: ClusterVectorEnv(3, scenario)])
 def test_views_of_environments_are_read_only_and_stay(make):
     env = make(SMALL)
@@ -110,6 +111,7 @@ def test_views_made_of_observations_are_read_only():
         assert not array.flags.writeable, name
 
 
+@pytest.mark.interpreted
 def test_the_error_names_the_line_of_the_policy(tmp_path, capsys):
     file = tmp_path / "mine.py"
     file.write_text(
@@ -182,6 +184,7 @@ def test_nodes_that_do_not_exist_are_refused_in_evaluations(part, node):
         evaluate({"p": Chooses(*cluster)}, SMALL, [4.0], episodes=2)
 
 
+@pytest.mark.interpreted
 @pytest.mark.parametrize(
     "dtype", [np.int8, np.uint8, np.int16, np.uint16, np.int32, np.uint32, np.int64, np.uint64, float]
 )
@@ -220,6 +223,7 @@ STRANGE = [
 ]  # fmt: skip
 
 
+@pytest.mark.interpreted
 @pytest.mark.parametrize("mode", ACTIONS)
 def test_environments_refuse_in_one_line_what_is_no_action(mode):
     envs, env = ClusterVectorEnv(2, SMALL, action=mode), ClusterEnv(SMALL, action=mode)

@@ -18,6 +18,7 @@ from wsn_env.evaluation.progress import progress_bar
 from wsn_env.models.own import own_error, own_place
 from wsn_env.models.quantity import parse_overrides
 from wsn_env.models.recordings.files import DatasetWarning
+from wsn_env.reports.terminal import NOBODY_READS, any_terminal
 from wsn_env.scenario import Scenario
 
 FILES = (  # that commands write into their folders
@@ -120,11 +121,15 @@ def main(arguments: list[str] | None = None) -> int:
         Compile: run_compile,
     }
     commands: dict[str, Callable[..., Any]] = {kind.__name__.lower(): kind for kind in runs}
-    command = tyro.extras.subcommand_cli_from_dict(commands, prog="wsn", args=arguments)
-    folder = command.out if isinstance(command, (Evaluate, Calibrate)) else None
+    command: Any = None
     try:
-        with warnings_on_one_line(), nullcontext() if folder is None else alone_in(folder, FILES):
-            runs[type(command)](command)
+        with any_terminal():
+            command = tyro.extras.subcommand_cli_from_dict(commands, prog="wsn", args=arguments)
+            folder = command.out if isinstance(command, (Evaluate, Calibrate)) else None
+            with warnings_on_one_line(), nullcontext() if folder is None else alone_in(folder, FILES):
+                runs[type(command)](command)
+    except BrokenPipeError:
+        return NOBODY_READS
     except (ValueError, OSError, MemoryError) as problem:
         print(f"wsn: {own_place(problem)}{problem}", file=sys.stderr)
         return 2
@@ -285,10 +290,10 @@ def run_reproduce(command: Reproduce) -> None:
 
 def run_compile(command: Compile) -> None:
     """`wsn compile`."""
-    from wsn_env.compiled.store import store_folder
-    from wsn_env.evaluation.progress import progress_bar
+    from wsn_env.compiled.store import check_store, store_folder
     from wsn_env.evaluation.warm_up import compile_everything
 
+    check_store()
     started = time.perf_counter()
     with progress_bar() as report:
         count = compile_everything(report)

@@ -75,14 +75,14 @@ class RecordedEvaluation:
         """Write tracks.csv and tracks.json into a folder, each whole or not at all."""
         out = Path(out)
         out.mkdir(parents=True, exist_ok=True)
-        with replacing(out / "tracks.csv") as path, open(path, "w", newline="") as file:
+        with replacing(out / "tracks.csv") as path, open(path, "w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, ["track", *COLUMNS], lineterminator="\n")
             writer.writeheader()
             for name, each in self.by_track.items():
                 writer.writerows({"track": name} | row for row in each.rows)
         settings = {name: each.settings() for name, each in self.by_track.items()}
         with replacing(out / "tracks.json") as path:
-            path.write_text(json.dumps({"tracks": settings, "versions": versions()}, indent=1))
+            path.write_text(json.dumps({"tracks": settings, "versions": versions()}, indent=1), encoding="utf-8")
 
 
 def evaluate_recorded(  # noqa: PLR0913

@@ -35,12 +35,16 @@ def write_dataset(folder: str | Path, tracks: int = 2, seconds: float = 40, seed
         name: [place, number, f"sensor{number}"] for number, (name, place) in enumerate(zip(NAMES, places.tolist()))
     }
     beacons = {BEACON: [[], 1328790, "beacon1"]}
-    (folder / "tetam.dev").write_text(f"Dongles:{json.dumps(dongles)}\nBeacons:{json.dumps(beacons)}\n")
-    (folder / "tetam.par").write_text(json.dumps({"origin": [22, 9], "limits": [0.0, 0.0, *ROOM_M], "parity": 0.0296}))
+    (folder / "tetam.dev").write_text(
+        f"Dongles:{json.dumps(dongles)}\nBeacons:{json.dumps(beacons)}\n", encoding="utf-8"
+    )
+    (folder / "tetam.par").write_text(
+        json.dumps({"origin": [22, 9], "limits": [0.0, 0.0, *ROOM_M], "parity": 0.0296}), encoding="utf-8"
+    )
     at_1m = rng.normal(-59, 3, len(places))
     for track in range(tracks):
         lines = packet_lines(rng, places, at_1m, START_S + 1000 * track, seconds)
-        (folder / f"walk_{track}_all_sensors.mbd").write_text("".join(lines))
+        (folder / f"walk_{track}_all_sensors.mbd").write_text("".join(lines), encoding="utf-8")
     return folder
 
 

@@ -17,6 +17,7 @@ import inspect
 import os
 import shutil
 import sys
+import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -33,11 +34,14 @@ from numba.core.errors import NumbaError
 from wsn_env.compiled.stamp import options_text, stamp
 
 KEPT = 60  # folders of one kernel: of other kinds, and of other versions that may come back
-SUMS = "sums.txt"
+SOURCE, SUMS = "kernel.py", "sums.txt"
 THE_SAME_TIME = 1_000_000_000  # s: Numba compares when a source file was changed
+
+NOT_KEPT = "compiled kernels cannot be kept in {} ({}); set NUMBA_CACHE_DIR to a folder that can be written to"
 
 compiled: list[str] = []  # names of the kernels compiled (not loaded) in this process
 _opened: dict[object, str] = {}  # kernels by Numba's dispatcher
+_unkept: dict[object, str] = {}  # why those cannot be kept
 _folders: list[Path] = []  # of the kernels opened
 _lock = threading.RLock()
 
@@ -47,13 +51,33 @@ def store_folder() -> Path:
     given = numba.config.CACHE_DIR
     if given:
         return Path(given) / "wsn_env"
+    try:
+        home = Path.home()
+    except RuntimeError:  # a user who is only a number, as containers have
+        home = Path("/nonexistent")
     if sys.platform == "win32":
-        home = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+        folder = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
     elif sys.platform == "darwin":
-        home = Path.home() / "Library" / "Caches"
+        folder = home / "Library" / "Caches"
     else:
-        home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return home / "wsn_env" / "kernels"
+        folder = Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")
+    return folder / "wsn_env" / "kernels"
+
+
+def check_store() -> None:
+    """See that kernels can be kept.
+
+    Raises:
+        ValueError: they cannot.
+    """
+    folder = store_folder()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        why = _why_not_writable(folder)
+    except OSError as problem:
+        why = problem.strerror or str(problem)
+    if why:
+        raise ValueError(NOT_KEPT.format(folder, why))
 
 
 def open_kernel(
@@ -69,31 +93,45 @@ def open_kernel(
         more = options_text(options) + ("" if kinds is None else repr(kinds))
         folder = store_folder() / f"{name}-{stamp(function, more=more)}"
         try:
-            source = _prepare(folder, function)
-        except OSError as problem:
-            _say_once(f"compiled kernels cannot be kept in {store_folder()} ({problem.strerror}); set NUMBA_CACHE_DIR")
+            _prepare(folder, function)
+            with _alone_in(folder):
+                return _open_kept(folder, function, options, arguments)
+        except OSError as problem:  # the store's: kernels raise none
             dispatcher = numba.jit(**options)(function)
             _opened[dispatcher] = name
+            _unkept[dispatcher] = problem.strerror or str(problem)
             return dispatcher, dispatcher(*arguments)
-        with _alone_in(folder):
-            _throw_away_damaged(folder)
-            dispatcher = _dispatcher(function, options, source)
-            _opened[dispatcher] = name
-            before = len(compiled)
-            try:
-                result = _without_collecting(dispatcher, arguments)
-            except NumbaError:  # the function's own mistake
+
+
+def _open_kept(
+    folder: Path, function: FunctionType, options: dict[str, Any], arguments: tuple[Any, ...]
+) -> tuple[Any, Any]:
+    """The function of a kernel's folder, and its result; what is missing there is compiled."""
+    name = folder.name.rpartition("-")[0]
+    why = _why_not_writable(folder)
+    if why:  # Numba reads only where it may write
+        folder = _copy(folder)
+    dispatcher = _dispatcher(function, options, folder)
+    _throw_away_damaged(folder)
+    for attempt in range(2):
+        _opened[dispatcher] = name
+        if why:
+            _unkept[dispatcher] = why
+        before = len(compiled)
+        try:
+            result = _without_collecting(dispatcher, arguments)
+            break
+        except NumbaError:  # the function's own mistake
+            raise
+        except Exception as problem:  # what unpickling a damaged index raises can be anything
+            if attempt or not _files(folder):
                 raise
-            except Exception as problem:  # what unpickling a damaged index raises can be anything
-                if not _files(folder):
-                    raise
-                _throw_away(folder, repr(problem))
-                dispatcher = _dispatcher(function, options, source)
-                _opened[dispatcher] = name
-                result = _without_collecting(dispatcher, arguments)
-            _folders.append(folder)
-            _sign(folder, anew=len(compiled) > before)
-        return dispatcher, result
+            _throw_away(folder, repr(problem))
+            dispatcher = _dispatcher(function, options, folder)
+    if not why:
+        _folders.append(folder)
+        _sign(folder, anew=len(compiled) > before)
+    return dispatcher, result
 
 
 @contextmanager
@@ -103,7 +141,7 @@ def _alone_in(folder: Path) -> Iterator[None]:
         try:
             import fcntl
 
-            fcntl.flock(held.enter_context(open(folder / "lock", "w")), fcntl.LOCK_EX)
+            fcntl.flock(held.enter_context(open(folder / "lock", "wb")), fcntl.LOCK_EX)
         except (ImportError, OSError):  # on Windows, or in a folder that can only be read: both compile
             pass
         yield
@@ -120,17 +158,17 @@ def _without_collecting(dispatcher, arguments: tuple[Any, ...]):
             gc.enable()
 
 
-def _dispatcher(function: FunctionType, options: dict[str, Any], source: Path):
+def _dispatcher(function: FunctionType, options: dict[str, Any], folder: Path):
     """Numba's, of the same code, said to stand in the store."""
-    code = function.__code__.replace(co_filename=str(source), co_firstlineno=1)
+    code = function.__code__.replace(co_filename=str(folder / SOURCE), co_firstlineno=1)
     twin = FunctionType(code, function.__globals__, function.__name__, function.__defaults__, function.__closure__)
     twin.__qualname__, twin.__module__, twin.__doc__ = function.__qualname__, function.__module__, function.__doc__
     return numba.jit(**options, cache=True)(twin)
 
 
-def _prepare(folder: Path, function: FunctionType) -> Path:
-    """The source file in a kernel's folder, the same for every process; older versions make room."""
-    source = folder / "kernel.py"
+def _prepare(folder: Path, function: FunctionType) -> None:
+    """Make a kernel's folder with its source file, the same for every process; older versions make room."""
+    source = folder / SOURCE
     if not source.exists():
         folder.mkdir(parents=True, exist_ok=True)
         try:
@@ -148,7 +186,36 @@ def _prepare(folder: Path, function: FunctionType) -> Path:
     elif source.stat().st_mtime != THE_SAME_TIME:  # copied, or touched
         with suppress(OSError):
             os.utime(source, (THE_SAME_TIME, THE_SAME_TIME))
-    return source
+
+
+def _why_not_writable(folder: Path) -> str:
+    """What Numba would meet that wrote a kernel of this folder; "" for nothing."""
+    try:
+        tempfile.TemporaryFile(dir=numba.config.CACHE_DIR or folder).close()
+    except OSError as problem:
+        return problem.strerror or str(problem)
+    return ""
+
+
+def _copy(folder: Path) -> Path:
+    """A kernel's folder copied to where this process may write."""
+    own = _own_folder() / folder.name
+    (own / "__pycache__").mkdir(parents=True, exist_ok=True)
+    for path in _files(folder):
+        shutil.copyfile(path, own / "__pycache__" / path.name)
+    for name in (SOURCE, SUMS):
+        with suppress(FileNotFoundError):
+            shutil.copyfile(folder / name, own / name)
+    os.utime(own / SOURCE, (THE_SAME_TIME, THE_SAME_TIME))
+    return own
+
+
+@cache
+def _own_folder() -> Path:
+    """A folder of this process's own, which goes with it."""
+    folder = Path(tempfile.mkdtemp(prefix="wsn_env-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
 
 
 def _age(folder: Path) -> float:
@@ -222,7 +289,11 @@ class _Watch(event.Listener):
         name = _opened.get(event.data.get("dispatcher"))
         if name is not None:
             compiled.append(name)
-            _say_once("compiling (once on this machine, up to a minute; `wsn compile` does all of it) ...")
+            why = _unkept.get(event.data["dispatcher"])
+            if why is None:
+                _say_once("compiling (once on this machine, up to a minute; `wsn compile` does all of it) ...")
+            else:
+                _say_once(f"compiling at every start, up to a minute: {NOT_KEPT.format(store_folder(), why)}")
 
     def on_end(self, event):
         pass

@@ -121,7 +121,7 @@ class Evaluation:
         """Write evaluation.csv and evaluation.json into a folder, each whole or not at all."""
         out = Path(out)
         out.mkdir(parents=True, exist_ok=True)
-        with replacing(out / "evaluation.csv") as path, open(path, "w", newline="") as file:
+        with replacing(out / "evaluation.csv") as path, open(path, "w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
             writer.writeheader()
             writer.writerows(self.rows)
@@ -134,7 +134,9 @@ class Evaluation:
             for policy in self.policies
         ]
         with replacing(out / "evaluation.json") as path:
-            path.write_text(json.dumps(self.settings() | {"versions": versions(), "means": means}, indent=1))
+            path.write_text(
+                json.dumps(self.settings() | {"versions": versions(), "means": means}, indent=1), encoding="utf-8"
+            )
 
     def _compare_to_reference(self, policy: str, lam: float) -> dict[str, object]:
         ratio = self.rms_over_reference(policy, lam)

@@ -165,7 +165,7 @@ def save_front(evaluation: Evaluation, fronts: Fronts, volumes: list[Volume], ou
 
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
-    with replacing(out / "front.csv") as path, open(path, "w", newline="") as file:
+    with replacing(out / "front.csv") as path, open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COLUMNS)
         for name, points in fronts.items():
@@ -185,7 +185,7 @@ def save_front(evaluation: Evaluation, fronts: Fronts, volumes: list[Volume], ou
     }
     made_by = {"versions": versions() | {"moocore": moocore.__version__}}
     with replacing(out / "front.json") as path:
-        path.write_text(json.dumps(evaluation.settings() | made_by | found, indent=1))
+        path.write_text(json.dumps(evaluation.settings() | made_by | found, indent=1), encoding="utf-8")
 
 
 def check_front_libraries(pictures: bool) -> None:

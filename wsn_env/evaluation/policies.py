@@ -169,7 +169,7 @@ def read_saved(path: Path, key: str) -> Any:
     if not path.is_file():
         raise ValueError(f"{path} is not a saved policy: there is no such file")
     try:
-        return json.loads(path.read_text())[key]
+        return json.loads(path.read_text(encoding="utf-8"))[key]
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as problem:
         raise ValueError(f"{path} is not a saved policy: {problem!r}") from None
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import base64
 import io
+import os
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,6 +23,19 @@ NEEDED = "pictures need matplotlib: pip install 'wsn_env[plot]'"
 def can_draw() -> bool:
     """Whether matplotlib is there."""
     return find_spec("matplotlib") is not None
+
+
+def _import_with_any_backend(backend: str) -> None:
+    """matplotlib refuses to be imported where MPLBACKEND names none that it knows, although files need none."""
+    del os.environ["MPLBACKEND"]
+    import matplotlib
+
+    with suppress(ValueError):
+        matplotlib.rcParams["backend"] = os.environ["MPLBACKEND"] = backend
+
+
+if can_draw() and os.environ.get("MPLBACKEND"):
+    _import_with_any_backend(os.environ["MPLBACKEND"])
 
 
 def escape_label(text: str) -> str:
