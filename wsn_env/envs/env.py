@@ -12,6 +12,7 @@ from wsn_env.compiled import draws
 from wsn_env.envs.actions import ActionName
 from wsn_env.envs.interface import Interface, Settings, check_options, scenario_of
 from wsn_env.envs.observations import ObservationName
+from wsn_env.envs.one_thread import Busy, one_thread
 from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera, RenderMode
 from wsn_env.envs.rewards import RewardName
 from wsn_env.models.measurement.base import Order
@@ -71,6 +72,7 @@ class ClusterEnv(gym.Env):
         if self.interface.reward_space is not None:
             self.reward_space: gym.spaces.Box = self.interface.reward_space
             self.reward_dim: int = 2
+        self._busy = Busy()
         self._state: State = None  # type: ignore[assignment]  # until the first reset
         self._view: View = None  # type: ignore[assignment]  # shares the state's arrays
         self._shown: View | None = None  # the period's for others, once they have asked
@@ -79,6 +81,7 @@ class ClusterEnv(gym.Env):
         self._detections = 0
         self._reference = Reference(self.scenario) if has_reference(self.scenario) else None
 
+    @one_thread
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """A new episode: seed fixes field, track and every draw."""
         check_options(options)
@@ -99,6 +102,14 @@ class ClusterEnv(gym.Env):
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """One period. Returns observation, reward, terminated, truncated, info."""
+        if not self._busy.acquire(False):  # as `one_thread`, for less
+            raise self._busy.refusal(self, "step")
+        try:
+            return self._step(action)
+        finally:
+            self._busy.release()
+
+    def _step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         if self._state is None:
             raise gym.error.ResetNeeded("call reset() before step()")
         if self._ended:
@@ -133,6 +144,7 @@ class ClusterEnv(gym.Env):
         return self.interface.reward_and_info(dict(zip(_OUTCOMES, outcome.row.item())), self._lam)
 
     @property
+    @one_thread
     def view(self) -> View:
         """What hand-written policies see now: `policy.act(env.view)` is their choice, whatever the action space."""
         if self._state is None:
@@ -141,12 +153,14 @@ class ClusterEnv(gym.Env):
             self._shown = View.of(self._state)
         return self._shown
 
+    @one_thread
     def action_masks(self) -> np.ndarray:
         """Which entries of the action make sense now (flat bool, as sb3-contrib's MaskablePPO wants them)."""
         if self._state is None:
             raise gym.error.ResetNeeded("call reset() first")
         return self.interface.action.masks(self._view)[0]
 
+    @one_thread
     def render(self) -> Any:
         """A frame (frame_px, frame_px, 3) uint8 of the present state; in "human" mode None: reset and step show it."""
         if self._camera is None or self._state is None:

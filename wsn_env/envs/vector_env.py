@@ -15,6 +15,7 @@ from wsn_env.compiled import draws
 from wsn_env.envs.actions import ActionName
 from wsn_env.envs.interface import Interface, Settings, check_options, scenario_of
 from wsn_env.envs.observations import ObservationName
+from wsn_env.envs.one_thread import Busy, one_thread
 from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera, RenderMode
 from wsn_env.envs.rewards import RewardName
 from wsn_env.models.measurement.base import Order
@@ -77,6 +78,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             self.reward_space: gym.spaces.Box = self.interface.reward_space
             self.reward_dim: int = 2
         self._generators: list[np.random.Generator | None] = [None] * self.num_envs
+        self._busy = Busy()
         self._state: State = None  # type: ignore[assignment]  # until the first reset
         self._view: View = None  # type: ignore[assignment]  # shares the state's arrays
         self._shown: View | None = None  # the period's for others, once they have asked
@@ -88,6 +90,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         if has_reference(self.scenario):
             self._reference = Reference(self.scenario, self.num_envs, self.world.threads)
 
+    @one_thread
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
@@ -137,6 +140,14 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
 
     def step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """One period for every row; ended rows start anew as the autoreset mode says."""
+        if not self._busy.acquire(False):  # as `one_thread`, for less
+            raise self._busy.refusal(self, "step")
+        try:
+            return self._step(actions)
+        finally:
+            self._busy.release()
+
+    def _step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         if self._state is None:
             raise gym.error.ResetNeeded("call reset() before step()")
         anew = self._ended
@@ -206,6 +217,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         infos |= _mask_info(info)
         return self._observe(ended), reward, terminated, truncated, infos
 
+    @one_thread
     def skip_episodes(self, counts: np.ndarray) -> None:
         """Let each row's generator pass over so many episodes (B,), as if they had been played."""
         for generator, count in zip(self._generators, counts.tolist()):
@@ -218,6 +230,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         return self._state.lam
 
     @property
+    @one_thread
     def view(self) -> View:
         """What hand-written policies see now, all rows: `policy.act(envs.view)` is their choice."""
         if self._state is None:
@@ -226,12 +239,14 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             self._shown = View.of(self._state)
         return self._shown
 
+    @one_thread
     def action_masks(self) -> np.ndarray:
         """(B, n) bool: which entries of each row's action make sense now."""
         if self._state is None:
             raise gym.error.ResetNeeded("call reset() first")
         return self.interface.action.masks(self._view)
 
+    @one_thread
     def render(self) -> Any:
         """A tuple of B frames (frame_px, frame_px, 3) uint8; in "human" mode None: reset and step show one window."""
         if self._camera is None or self._state is None:
