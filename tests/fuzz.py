@@ -33,6 +33,7 @@ from wsn_env.envs.merit import ORDERS
 from wsn_env.envs.observations import OBSERVATIONS, make_observation
 from wsn_env.envs.registration import IDS
 from wsn_env.envs.rewards import REWARDS
+from wsn_env.models.measurement.beacon import OF_RECEIVERS
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.scenario.scenario import BY_NAME, MOST_LAM, named_scenarios
 from wsn_env.scenario.tracking import TRACKERS, Tracking, reads
@@ -121,9 +122,12 @@ def draw_quantities(rng: Random, sections: dict[str, Any]) -> dict[str, Any]:
     drawn: dict[str, Any] = {}
     for section in sections.values():
         for item in fields(section):
-            if "allowed" not in item.metadata or item.name == "tracker":
+            allowed, value = item.metadata.get("allowed", OF_RECEIVERS.get(item.name)), getattr(section, item.name)
+            if allowed is None or item.name == "tracker":
                 continue
-            allowed, value = dict(item.metadata["allowed"]), getattr(section, item.name)
+            allowed = dict(allowed)
+            if isinstance(value, tuple):  # one a receiver
+                value = value[0]
             if allowed.pop("optional", False) and rng.random() < 0.7:
                 continue
             if "choices" in allowed:
@@ -236,7 +240,7 @@ def draw_others(rng: Random, sections: dict[str, Any], keywords: dict[str, Any])
         drawn["unscored"] = min(sections["scenario"].unscored, keywords["periods"] - 1)
     for item in fields(sections["measurement"]):  # one a receiver
         value, nodes = getattr(sections["measurement"], item.name), keywords["nodes"]
-        if isinstance(value, tuple) and len(value) != nodes:
+        if isinstance(value, tuple) and len(value) != nodes and item.name not in keywords:
             drawn[item.name] = value[0]
     if hasattr(sections["measurement"], "mean_db") and "threshold_db" in {
         item.name for item in fields(sections["detection"])
