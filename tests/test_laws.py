@@ -1,6 +1,5 @@
 """The six laws of the world, on random scenarios with random choices."""
 
-import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -8,13 +7,22 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tests.worlds import KEYS, assert_same, choices, keys_of, leaves, living_entries, play, scenarios
+from tests.worlds import (
+    HAND_WRITTEN,
+    KEYS,
+    assert_finite,
+    assert_same,
+    choices,
+    keys_of,
+    leaves,
+    living_entries,
+    play,
+    scenarios,
+)
 from wsn_env import Cluster, Scenario, View, World, make_policy
 from wsn_env.envs.interface import Interface, Settings
 from wsn_env.scenario.tracking import BOUNDARY_TRACKERS
 
-HAND_WRITTEN = "all boundary centroid nearest0 nearest3 pre_dc random static_cluster strongest_signal".split()
-HAND_WRITTEN += "adaptive adaptive_informed greedy informed2".split()
 SEEDS = st.integers(0, 2**32 - 1)
 
 
@@ -247,57 +255,6 @@ def test_the_first_search_is_charged(scenario, seed):
 
 
 # --- 6: nothing is silently wrong -----------------------------------------------------------------------------
-
-
-def assert_finite(*values):
-    for value in values:
-        for name, array in leaves(value):
-            assert np.isfinite(array).all(), name
-
-
-@law(360)
-@given(scenarios(), SEEDS)
-def test_everything_is_finite_always(scenario, seed):
-    interfaces = [
-        Interface(scenario, Settings(observation=o, order=r))
-        for o, r in [("candidates", "information"), ("dict", "nearest"), ("view", "nearest")]
-    ]
-    policies = [make_policy(name, scenario) for name in HAND_WRITTEN]
-    for _, cluster, state, outcome in play(scenario, keys_of(seed, 3), seed):
-        assert_finite(state, outcome)
-        assert (np.diagonal(state.belief.cov, axis1=1, axis2=2) >= 0).all()
-        assert (state.belief.log_weights <= 0).all()
-        assert (outcome.dropped >= 0).all() and (outcome.dropped <= cluster.members.shape[1] + 1).all()
-        assert (outcome.delivered <= outcome.detections).all()
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            view = View.of(state)
-            assert_finite({"spread": view.spread_m})
-            for policy in policies:
-                choice = policy.act(view)
-                assert choice.head.shape == (3,) and len(choice.members) == 3
-            for interface in interfaces:
-                array = interface.observation.encode(view)
-                space = interface.observation.space
-                for row in range(3):
-                    if isinstance(array, dict):
-                        for name, value in array.items():
-                            assert space[name].contains(value[row]), name
-                    else:
-                        assert space.contains(array[row])
-
-
-@law(120)
-@given(scenarios(battery_j=5e-5), SEEDS, st.sampled_from(HAND_WRITTEN))
-def test_policies_carry_on_to_the_last_node_and_beyond(scenario, seed, name):
-    world, policy = World(scenario, threads=1), make_policy(name, scenario)
-    state = world.reset(keys_of(seed, 3))
-    for _ in range(scenario.periods):
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            cluster = policy.act(View.of(state))
-        state, outcome = world.step(state, cluster, donate=True)
-        assert_finite(state, outcome)
 
 
 @pytest.mark.parametrize("tracker", ["particle", "ekf", "snapshot", *BOUNDARY_TRACKERS])

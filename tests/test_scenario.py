@@ -10,12 +10,14 @@ import pytest
 from wsn_env import Scenario, ScenarioError, World
 from wsn_env.models.detection.radius import Detection
 from wsn_env.models.field import Field
+from wsn_env.models.kinds import constants_type
 from wsn_env.models.measurement.position import Position
 from wsn_env.models.measurement.rssi import Rssi
 from wsn_env.models.motion.base import Motion
 from wsn_env.models.motion.sine import Sine
 from wsn_env.models.motion.straight import Straight
 from wsn_env.models.radio.radio import Radio
+from wsn_env.scenario.constants import constants
 from wsn_env.scenario.tracking import Tracking
 
 
@@ -205,6 +207,29 @@ def test_whole_numbers_become_integers():
     scenario = Scenario.named("PreDC-v0", nodes=10.0, particles=np.int64(30), periods=np.float64(5))
     assert [type(x) for x in (scenario.field.nodes, scenario.tracking.particles, scenario.periods)] == [int] * 3
     assert World(scenario, threads=1).reset([1]).network.battery.shape == (1, 10)
+
+
+@pytest.mark.parametrize(
+    "whole",
+    [
+        dict(radius_m=10, ceiling=1, softness=1, decay=0),
+        dict(noise_m=2),
+        dict(filter_q=0, resample_below=1, search_miss=1),
+        dict(measurement="binary", flip=0, edge_m=1),
+        dict(measurement="rssi", floor_m=1),
+        dict(detection="unequal", radius_spread=0),
+        dict(motion="turns", speed_ms=1, turn_probability=1),
+        dict(radio="modem", hop_m=100, battery_j=1),
+    ],
+    ids=str,
+)
+def test_whole_numbers_need_no_kernels_of_their_own(whole):
+    """Kernels are compiled for the types of constants, a minute each time: of 10 those of 10.0."""
+    words = {name: value for name, value in whole.items() if isinstance(value, str)}
+    given, usual = Scenario.named("PreDC-v0", **whole), Scenario.named("PreDC-v0", **words)
+    assert constants(given).dtype == constants(usual).dtype
+    assert constants_type(given.motion, given) == constants_type(usual.motion, usual)
+    assert all(type(given.quantities()[name]) is float for name in whole.keys() - words.keys())
 
 
 def test_given_positions_fix_the_field():

@@ -18,6 +18,8 @@ MOTIONS = ["crossing", "straight", "sine", "circle", "turns", "waypoint"]
 MODEM_J = 5000.0  # a modem's packets cost so many times a radio's
 SOURCE_DB = 120.0
 KEYS = st.integers(0, 2**64 - 1)
+HAND_WRITTEN = "all boundary centroid nearest0 nearest3 pre_dc random static_cluster strongest_signal".split()
+HAND_WRITTEN += "adaptive adaptive_informed greedy informed2".split()
 
 
 @st.composite
@@ -213,6 +215,13 @@ def assert_same(left, right, rows=slice(None), other=slice(None)):
     for (name, a), (_, b) in zip(leaves(left), leaves(right), strict=True):
         a, b = a[rows], b[other]
         assert a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes(), name
+
+
+def assert_finite(*values):
+    """All their numbers are."""
+    for value in values:
+        for name, array in leaves(value):
+            assert np.isfinite(array).all(), name
 
 
 def living_entries(state):

@@ -110,8 +110,9 @@ class Section:
             if "allowed" in item.metadata:
                 value, allowed = getattr(self, item.name), item.metadata["allowed"]
                 check_quantity(type(self).__name__, item.name, value, **allowed)
-                if allowed.get("whole") and value is not None:
-                    object.__setattr__(self, item.name, int(value))
+                if value is not None and "choices" not in allowed:
+                    # 10 is 10.0: kernels are compiled for the types of constants.
+                    object.__setattr__(self, item.name, (int if allowed.get("whole") else float)(value))
 
 
 def short(text: str, most: int = 80) -> str:

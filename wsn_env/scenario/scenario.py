@@ -62,11 +62,13 @@ class Scenario(Section):
     """Everything about a simulated network. `Scenario.named(id)` gives a published system's."""
 
     name: str = "PreDC-v0"
-    periods: int = quantity(100, "horizon of an episode", at_least=1, whole=True)
+    periods: int = quantity(100, "horizon of an episode", at_least=1, at_most=10**7, whole=True)
     period_s: float = quantity(1.0, "sampling period T", at_least=1e-6, at_most=3600)
     lam: float | tuple[float, float] = 4.0  # m/mJ; a pair (low, high): drawn log-uniformly for each episode
-    typical_error_m: float = quantity(1.0, "error of a good schedule: the scale of a learner's rewards", above=0)
-    typical_energy_mj: float = quantity(0.3, "its energy in a period", above=0)
+    typical_error_m: float = quantity(
+        1.0, "error of a good schedule: the scale of a learner's rewards", at_least=1e-9, at_most=1e9
+    )
+    typical_energy_mj: float = quantity(0.3, "its energy in a period", at_least=1e-9, at_most=1e9)
     unscored: int = quantity(0, "periods at the start that rms_m leaves out: acquisition", at_least=0, whole=True)
     ends_outside: bool = quantity(
         False,
@@ -76,8 +78,10 @@ class Scenario(Section):
     )
     # The hypervolume's reference point, above what was measured of the head alone (nearest0) and of the most expensive
     # competitive policy; it stays as it is when rules get better.
-    reference_error_m: float = quantity(1.5, "mean error that a point of a front must stay below", above=0)
-    reference_energy_mj: float = quantity(0.4, "energy in a period that it must stay below", above=0)
+    reference_error_m: float = quantity(
+        1.5, "mean error that a point of a front must stay below", at_least=1e-9, at_most=1e9
+    )
+    reference_energy_mj: float = quantity(0.4, "energy in a period that it must stay below", at_least=1e-9, at_most=1e9)
     field: Field = Field()
     motion: Motion = Crossing()
     detection: DetectionRule = Detection()

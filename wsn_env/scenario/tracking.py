@@ -87,12 +87,14 @@ class Tracking(Section):
         "the filter's target walks in the room: its velocity is an Ornstein-Uhlenbeck process of sd rest_sd_ms and this"
         " time constant, reflected at the walls; None: white acceleration of filter_q anywhere (particle only)",
         above=0,
+        at_most=1e9,
         optional=True,
     )
     gate_m: float | None = quantity(
         None,
         "boundary trackers refuse what is off the prediction by more than this and three sds; None: nothing",
         above=0,
+        at_most=1e9,
         optional=True,
     )
     start: Literal["known", "search", "field", "fix"] = quantity(

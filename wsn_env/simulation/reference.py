@@ -139,7 +139,7 @@ def _begin(cs, starts, rows, handle, memory, reference_m):
             nodes, truth = state.reports.node[b, : state.reports.count[b]], state.track[b, 0]
             xx, xy, yy = _information_of(nodes, state.network.positions[b], truth[0], truth[2], c)
             _correct(own.cov, xx, xy, yy)
-        reference_m[b] = np.sqrt(own.cov[0, 0] + own.cov[2, 2])
+        reference_m[b] = np.sqrt(_position_variance(own.cov))
 
 
 @lean_kernel
@@ -183,9 +183,15 @@ def _take_period(own, xx, xy, yy, c):
     """Predict, correct; returns the trace of the position part."""
     predict_covariance(own.cov, c.period_s, c.tracking.q, own.cov)
     _correct(own.cov, xx, xy, yy)
-    square = own.cov[0, 0] + own.cov[2, 2]
+    square = _position_variance(own.cov)
     own.squares += square
     return square
+
+
+@lean_piece
+def _position_variance(cov):
+    """The trace of the position part; what rounding leaves below 0 counts as 0."""
+    return max(cov[0, 0], 0.0) + max(cov[2, 2], 0.0)
 
 
 @lean_piece

@@ -12,13 +12,20 @@ from wsn_env.compiled.elementary import log
 from wsn_env.models.measurement.base import AtHead, Line, Measurement, Memory, Occasion, PositionBelief
 from wsn_env.models.measurement.beacon_levels import predict_levels, weigh_levels
 from wsn_env.models.measurement.beacon_packets import Packets
-from wsn_env.models.quantity import ScenarioError, quantity
+from wsn_env.models.quantity import ScenarioError, check_quantity, quantity
 from wsn_env.models.recordings.replay import load_map
 
 if TYPE_CHECKING:
     from wsn_env.scenario import Scenario
 
+MOST_PACKETS = 10_000_000  # of an episode: each receiver's are drawn when it begins
 MAP_LEAVES = 0.15  # of the static field's variance, where a map was made on other days
+
+OF_RECEIVERS: dict[str, dict[str, float]] = {  # what may be each one's own
+    "at_1m_db": dict(at_least=-1e6, at_most=1e6),
+    "exponents": dict(at_least=0, at_most=1000),
+    "heights_m": dict(at_least=-1000, at_most=1000),
+}
 
 
 @dataclass(frozen=True)
@@ -69,7 +76,7 @@ class Beacon(Measurement):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("at_1m_db", "exponents", "heights_m"):
+        for name, allowed in OF_RECEIVERS.items():
             value = getattr(self, name)
             try:
                 array = np.asarray(value, dtype=float)
@@ -77,6 +84,8 @@ class Beacon(Measurement):
                 array = np.array(np.nan)
             if array.ndim > 1 or not array.size or not np.isfinite(array).all():
                 raise ScenarioError(f"Beacon.{name} = {value!r}: must be a finite number, or one for each receiver")
+            for number in array.flat:
+                check_quantity("Beacon", name, number.item(), **allowed)
             object.__setattr__(self, name, tuple(array.tolist()) if array.ndim else array.item())
         if not self.least_loss_after_loss <= self.loss_after_loss:
             raise ScenarioError(
@@ -128,7 +137,7 @@ class Beacon(Measurement):
             ScenarioError: a list has another length.
         """
         columns = []
-        for name in ("at_1m_db", "exponents", "heights_m"):
+        for name in OF_RECEIVERS:
             array = np.asarray(getattr(self, name), dtype=float)
             if array.ndim and len(array) != nodes:
                 raise ScenarioError(f"Beacon.{name} has {len(array)} entries: must have one for each of {nodes} nodes")
@@ -142,6 +151,13 @@ class Beacon(Measurement):
     def check(self, scenario: Scenario) -> None:
         """Levels of all receivers, none of what silence or a search would tell."""
         self.of_nodes(scenario.field.nodes)
+        sent = scenario.periods * scenario.period_s / self.interval_s
+        if sent > MOST_PACKETS:
+            least = scenario.periods * scenario.period_s / MOST_PACKETS
+            raise ScenarioError(
+                f"Beacon.interval_s = {self.interval_s}: must be at least {least:.4g} s, so that an episode has at most"
+                f" {MOST_PACKETS:,} packets"
+            )
         tracking = scenario.tracking
         if tracking.search:
             raise ScenarioError("Tracking.search = True: allowed is False with Beacon levels")

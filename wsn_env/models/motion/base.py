@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from wsn_env.models.measurement.base import Measurement
     from wsn_env.scenario import Scenario
 
+FASTEST_MS, FARTHEST_M = 1e6, 1e6  # of settings: squares of what they lead to stay float32
+
 
 class Course(NamedTuple):
     """Where and when a track is drawn."""

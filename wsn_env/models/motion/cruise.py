@@ -9,7 +9,7 @@ import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import HALF_PI, sincos
-from wsn_env.models.motion.base import Motion, set_state
+from wsn_env.models.motion.base import FASTEST_MS, Motion, set_state
 from wsn_env.models.motion.prediction import advance
 from wsn_env.models.quantity import quantity
 
@@ -31,7 +31,7 @@ class Cruise(Motion):
 
     allocates: ClassVar[bool] = False
     fitting_q: ClassVar[float] = 0.01
-    speed_ms: float = quantity(1.0, "speed at the start", above=0)
+    speed_ms: float = quantity(1.0, "speed at the start", above=0, at_most=FASTEST_MS)
     acceleration_ms2: float = quantity(0.01, "sd of the white acceleration on the track", at_least=0, at_most=1000)
     inset_m: float = quantity(200.0, "starts keep this distance from the border", at_least=0)
     margin_m: float = quantity(60.0, "the whole track keeps this distance from the border", at_least=0)

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from wsn_env.compiled import draws
-from wsn_env.models.motion.base import Motion, set_state
+from wsn_env.models.motion.base import FARTHEST_M, FASTEST_MS, Motion, set_state
 from wsn_env.models.motion.prediction import advance
 from wsn_env.models.quantity import quantity
 
@@ -26,8 +26,10 @@ class Free(Motion):
     allocates: ClassVar[bool] = False
     bounded: ClassVar[bool] = False
     fitting_q: ClassVar[float] = 0.025
-    spread_m: float = quantity(8.0, "sd of the start about the field's middle, along each axis", above=0)
-    speed_ms: float = quantity(0.15, "sd of the velocity at the start, along each axis", above=0)
+    spread_m: float = quantity(
+        8.0, "sd of the start about the field's middle, along each axis", above=0, at_most=FARTHEST_M
+    )
+    speed_ms: float = quantity(0.15, "sd of the velocity at the start, along each axis", above=0, at_most=FASTEST_MS)
     acceleration_ms2: float = quantity(0.025, "sd of the white acceleration on the track (q)", at_least=0, at_most=1000)
 
     @property

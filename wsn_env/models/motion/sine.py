@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from wsn_env.compiled.elementary import HALF_PI, sincos
-from wsn_env.models.motion.base import Motion, set_state
+from wsn_env.models.motion.base import FASTEST_MS, Motion, set_state
 from wsn_env.models.quantity import quantity
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ class Sine(Motion):
 
     allocates: ClassVar[bool] = False
     fitting_q: ClassVar[float] = 0.2
-    speed_ms: float = quantity(0.9, "speed along x", above=0)
+    speed_ms: float = quantity(0.9, "speed along x", above=0, at_most=FASTEST_MS)
     amplitude_m: float = quantity(25.0, "swing along y", at_least=0)
     turn_s: float = quantity(100.0, "time of one wave", above=0)
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from wsn_env.models.motion.base import Motion, set_state
+from wsn_env.models.motion.base import FARTHEST_M, FASTEST_MS, Motion, set_state
 from wsn_env.models.quantity import quantity
 
 
@@ -17,8 +17,8 @@ class Straight(Motion):
 
     allocates: ClassVar[bool] = False
     fitting_q: ClassVar[float] = 0.02
-    from_m: float = quantity(5.0, "start, both axes", at_least=0)
-    velocity_ms: float = quantity(0.9, "velocity, both axes")
+    from_m: float = quantity(5.0, "start, both axes", at_least=0, at_most=FARTHEST_M)
+    velocity_ms: float = quantity(0.9, "velocity, both axes", at_least=-FASTEST_MS, at_most=FASTEST_MS)
 
     @staticmethod
     def draw(m: Any, stream: Any, course: Any, track: np.ndarray) -> None:

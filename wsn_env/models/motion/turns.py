@@ -9,7 +9,7 @@ import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import HALF_PI, sincos
-from wsn_env.models.motion.base import Motion, heading_of, reflect
+from wsn_env.models.motion.base import FASTEST_MS, Motion, heading_of, reflect
 from wsn_env.models.motion.prediction import advance
 from wsn_env.models.quantity import quantity
 
@@ -22,7 +22,7 @@ class Turns(Motion):
     """Random turns: constant speed, now and then a new heading within a quarter turn; reflected at the border."""
 
     fitting_q: ClassVar[float] = 0.2
-    speed_ms: float = quantity(1.0, "speed", above=0)
+    speed_ms: float = quantity(1.0, "speed", above=0, at_most=FASTEST_MS)
     turn_probability: float = quantity(0.1, "probability of a turn in a period", at_least=0, at_most=1)
 
     def check(self, scenario: Scenario) -> None:

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from wsn_env.compiled import draws
-from wsn_env.models.motion.base import Motion, set_state
+from wsn_env.models.motion.base import FASTEST_MS, Motion, set_state
 from wsn_env.models.quantity import ScenarioError, quantity
 
 if TYPE_CHECKING:
     from wsn_env.scenario import Scenario
+
+MOST_LEGS = 100  # in a period: across what the margin leaves of the room
 
 
 @dataclass(frozen=True)
@@ -21,8 +23,8 @@ class Walk(Motion):
 
     allocates: ClassVar[bool] = False
     fitting_q: ClassVar[float] = 0.2
-    slowest_ms: float = quantity(0.14, "least speed of a leg", above=0)
-    fastest_ms: float = quantity(0.73, "greatest speed of a leg", above=0)
+    slowest_ms: float = quantity(0.14, "least speed of a leg", above=0, at_most=FASTEST_MS)
+    fastest_ms: float = quantity(0.73, "greatest speed of a leg", above=0, at_most=FASTEST_MS)
     margin_m: float = quantity(1.0, "goals keep this distance from the walls", at_least=0)
 
     def __post_init__(self) -> None:
@@ -35,8 +37,9 @@ class Walk(Motion):
         room = min(scenario.field.room_m)
         if self.margin_m >= room / 2:
             raise self._limit("margin_m", f"below half the room, {room / 2} m")
-        if self.fastest_ms * scenario.period_s > room:
-            raise self._limit("fastest_ms", f"at most {room / scenario.period_s} m/s")
+        fastest = min(room, MOST_LEGS * (room - 2 * self.margin_m)) / scenario.period_s
+        if self.fastest_ms > fastest:
+            raise self._limit("fastest_ms", f"at most {fastest:.4g} m/s with a margin of {self.margin_m} m")
 
     @staticmethod
     def draw(m: Any, stream: Any, course: Any, track: np.ndarray) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from wsn_env.compiled import draws
-from wsn_env.models.motion.base import Motion, set_state
+from wsn_env.models.motion.base import FASTEST_MS, Motion, set_state
 from wsn_env.models.quantity import quantity
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ class Waypoint(Motion):
 
     allocates: ClassVar[bool] = False
     fitting_q: ClassVar[float] = 0.2
-    speed_ms: float = quantity(1.0, "speed", above=0)
+    speed_ms: float = quantity(1.0, "speed", above=0, at_most=FASTEST_MS)
 
     def check(self, scenario: Scenario) -> None:
         """At most a side in a period."""

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from wsn_env.scenario import Scenario
 
 RECEIVERS = ("head", "sink", "target")
+MOST_BITS, MOST_W = 10**9, 1e6
+MOST_J = 1e9  # what batteries lose is rounded to .1 uJ then
 
 
 @dataclass(frozen=True)
@@ -33,11 +35,13 @@ class Link(Kind):
     optional: ClassVar[tuple[str, ...]] = ("relayed",)
     allocates: ClassVar[bool] = False
 
-    report_bits: int = quantity(512, "a member's report", at_least=0, whole=True)
-    invitation_bits: int = quantity(128, "an invitation to a new member", at_least=0, whole=True)
-    handover_bits: int = quantity(448, "the estimate, from old to new head", at_least=0, whole=True)
-    wakeup_bits: int = quantity(128, "the wake-up of a search, paid by its receivers", at_least=0, whole=True)
-    broadcast_bits: int = quantity(32, "the head's word to resample", at_least=0, whole=True)
+    report_bits: int = quantity(512, "a member's report", at_least=0, at_most=MOST_BITS, whole=True)
+    invitation_bits: int = quantity(128, "an invitation to a new member", at_least=0, at_most=MOST_BITS, whole=True)
+    handover_bits: int = quantity(448, "the estimate, from old to new head", at_least=0, at_most=MOST_BITS, whole=True)
+    wakeup_bits: int = quantity(
+        128, "the wake-up of a search, paid by its receivers", at_least=0, at_most=MOST_BITS, whole=True
+    )
+    broadcast_bits: int = quantity(32, "the head's word to resample", at_least=0, at_most=MOST_BITS, whole=True)
     handover: Literal["estimate", "particles"] = quantity(
         "estimate",
         "what is handed over: the estimate (handover_bits) or every particle",
@@ -51,7 +55,7 @@ class Link(Kind):
         " node, which hears their beacons",
         choices=RECEIVERS,
     )
-    battery_j: float = quantity(1.0, "a node's energy at the start", above=0)
+    battery_j: float = quantity(1.0, "a node's energy at the start", above=0, at_most=MOST_J)
 
     if TYPE_CHECKING:  # a kind's are constants, quantities or properties
 

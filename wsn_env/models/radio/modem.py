@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from wsn_env.models.quantity import ScenarioError, quantity
-from wsn_env.models.radio.base import Link
+from wsn_env.models.radio.base import MOST_BITS, MOST_J, MOST_W, Link
 
 if TYPE_CHECKING:
     from wsn_env.scenario import Scenario
@@ -27,19 +27,21 @@ class Modem(Link):
     together last for three months of tracking by the strongest signal (2.1 J a period).
     """
 
-    transmit_w: float = quantity(1.5, "power while sending", at_least=0)
-    receive_w: float = quantity(0.025, "power while receiving, above listening", at_least=0)
-    listen_w: float = quantity(0.0125, "power of an awake node", at_least=0)
-    sleep_w: float = quantity(0.0002, "power of a sleeping node", at_least=0)
-    bit_rate: float = quantity(640.0, "bits a second", above=0)
+    transmit_w: float = quantity(1.5, "power while sending", at_least=0, at_most=MOST_W)
+    receive_w: float = quantity(0.025, "power while receiving, above listening", at_least=0, at_most=MOST_W)
+    listen_w: float = quantity(0.0125, "power of an awake node", at_least=0, at_most=MOST_W)
+    sleep_w: float = quantity(0.0002, "power of a sleeping node", at_least=0, at_most=MOST_W)
+    bit_rate: float = quantity(640.0, "bits a second", at_least=1e-3, at_most=1e15)
     receiver: Literal["head"] = quantity("head", "who hears the awake nodes: the cluster's head", choices=("head",))
-    hop_m: float = quantity(250.0, "range of a transmission", above=0)
-    sound_ms: float = quantity(1500.0, "speed of sound", above=0)
-    report_bits: int = quantity(64, "a member's report", at_least=0, whole=True)
-    invitation_bits: int = quantity(32, "an invitation to a new member", at_least=0, whole=True)
-    handover_bits: int = quantity(256, "the estimate, from old to new head", at_least=0, whole=True)
-    wakeup_bits: int = quantity(32, "the wake-up of a search, paid by its receivers", at_least=0, whole=True)
-    battery_j: float = quantity(50_000.0, "a node's energy at the start", above=0)
+    hop_m: float = quantity(250.0, "range of a transmission", at_least=1e-3, at_most=1e9)
+    sound_ms: float = quantity(1500.0, "speed of sound", at_least=1e-3, at_most=1e9)
+    report_bits: int = quantity(64, "a member's report", at_least=0, at_most=MOST_BITS, whole=True)
+    invitation_bits: int = quantity(32, "an invitation to a new member", at_least=0, at_most=MOST_BITS, whole=True)
+    handover_bits: int = quantity(256, "the estimate, from old to new head", at_least=0, at_most=MOST_BITS, whole=True)
+    wakeup_bits: int = quantity(
+        32, "the wake-up of a search, paid by its receivers", at_least=0, at_most=MOST_BITS, whole=True
+    )
+    battery_j: float = quantity(50_000.0, "a node's energy at the start", above=0, at_most=MOST_J)
 
     @property
     def tx_j_per_bit(self) -> float:
