@@ -22,7 +22,8 @@ from wsn_env.evaluation.kept_blocks import remove_kept_blocks
 from wsn_env.evaluation.progress import Progress
 from wsn_env.evaluation.rollout import Engine
 from wsn_env.evaluation.versions import versions
-from wsn_env.models.quantity import ScenarioError
+from wsn_env.models.arguments import checked
+from wsn_env.models.quantity import ScenarioError, whole_number
 from wsn_env.models.recordings.dataset import read_dataset, track_files, track_name
 from wsn_env.models.recordings.files import DatasetError
 from wsn_env.scenario import Scenario
@@ -85,11 +86,12 @@ class RecordedEvaluation:
             path.write_text(json.dumps({"tracks": settings, "versions": versions()}, indent=1))
 
 
+@checked
 def evaluate_recorded(  # noqa: PLR0913
-    policies: Sequence[str],
+    policies: str | Sequence[str],
     scenario: Scenario,
     folder: str | Path,
-    lams: Sequence[float] | None = None,
+    lams: float | Sequence[float] | None = None,
     seeds: int = 10,
     seed: int = 0,
     keep: str | Path | None = None,
@@ -114,6 +116,7 @@ def evaluate_recorded(  # noqa: PLR0913
         ValueError: another scenario, nothing to read, or too few tracks to leave one out.
     """
     _check_receivers(scenario)
+    seeds = whole_number("seeds", seeds, 1)
     paths = {track_name(path): path for path in track_files(folder)}
     scenarios = {name: scenario for name in paths}
     if not calibrated:
@@ -146,6 +149,7 @@ def insert_track_name(policies: str | Sequence[str], track: str) -> list[str]:
     return [policy.replace("{track}", track) if isinstance(policy, str) else policy for policy in policies]
 
 
+@checked
 def replay_scenario(scenario: Scenario, path: str | Path, calibrated: bool = False) -> Scenario:
     """The replay of one track, calibrated on the others of its folder if there are any.
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from wsn_env.evaluation.files import check_replaceable, replacing
 from wsn_env.evaluation.policies import Policy
+from wsn_env.models.arguments import checked
 from wsn_env.models.quantity import ScenarioError, whole_number
 from wsn_env.reports.pages.page import build_page, fill_template, json_for_script, read_template
 from wsn_env.reports.pages.recording import Recording, record
@@ -14,6 +15,7 @@ from wsn_env.scenario import Scenario
 MOST = 2  # policies side by side
 
 
+@checked
 def replay(policies: dict[str, Policy], scenario: Scenario, seed: int, out: str | Path) -> Recording:
     """Play an episode and write its page.
 
