@@ -22,7 +22,7 @@ from stable_baselines3.common.logger import configure
 from stable_baselines3.common.utils import LinearSchedule
 
 from wsn_env.agents.ppo import PPOPolicy, save_policy
-from wsn_env.cli import make_scenario
+from wsn_env.cli import make_scenario, show_any_letter
 from wsn_env.envs.interface import Settings
 from wsn_env.envs.observations import ObservationName
 from wsn_env.envs.vector_env import ClusterVectorEnv
@@ -149,6 +149,7 @@ class Training:
 
 def main() -> int:
     """Run; bad input is one line and exit status 2, Ctrl-C leaves a checkpoint and is 130."""
+    show_any_letter()
     settings = tyro.cli(Training, description=__doc__)
     try:
         train(settings)

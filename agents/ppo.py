@@ -100,5 +100,5 @@ def save_policy(folder: str | Path, network: PolicyNetwork, settings: Settings, 
     folder = Path(folder)
     network.save(folder / "policy.safetensors")
     with replacing(folder / "policy.json") as path:
-        path.write_text(json.dumps({"kind": "ppo", "interface": asdict(settings)} | facts, indent=1))
+        path.write_text(json.dumps({"kind": "ppo", "interface": asdict(settings)} | facts, indent=1), encoding="utf-8")
     return folder / "policy.json"

@@ -4,9 +4,7 @@ The calls are derived from the signatures, so that a new argument, quantity or o
 """
 
 import inspect
-import os
 import re
-import sys
 from dataclasses import fields
 from functools import partial
 from importlib.metadata import entry_points
@@ -43,7 +41,6 @@ from wsn_env.evaluation.policies import GROUP, named_policies, policy_names
 from wsn_env.learning.concat_vector_env import ConcatVectorEnv
 from wsn_env.learning.network import PolicyNetwork
 from wsn_env.learning.training_reward import TrainingReward
-from wsn_env.models.arguments import check_argument
 from wsn_env.models.recordings.dataset import read_dataset, read_track
 from wsn_env.papers import reproduce
 from wsn_env.reports.pages.replay_page import replay
@@ -211,7 +208,9 @@ def doors(where, dataset):
         "Calibration.save": door(calibration.save, path=where / "again.json"),
         "residual_map": door(residual_map, tracks=tracks, calibration=calibration),
         "save_map": door(save_map, field=residual_map(tracks, calibration), path=where / "map.npz"),
-        "evaluate_recorded": door(evaluate_recorded, policies=["nearest1"], scenario=ble, folder=dataset, seeds=1, calibrated=True),
+        "evaluate_recorded": door(
+            evaluate_recorded, policies=["nearest1"], scenario=ble, folder=dataset, seeds=1, calibrated=True
+        ),
         "replay_scenario": door(replay_scenario, scenario=ble, path=tracks[0].path),
         "ConcatVectorEnv": door(ConcatVectorEnv, parts=[envs]),
         "TrainingReward": door(TrainingReward, envs=envs),
@@ -244,11 +243,14 @@ def test_every_quantity(tmp_path):
     needed = {"span_m": {"tracks": (str(tmp_path / "track.csv"),)}}
     calls = {}
     for name in Quantities.__annotations__:
-        preset = next((each for each in presets if name in each.quantities()), TINY)
+        preset = next((each for each in presets if name in each.quantities()), Scenario.named("PreDC-v0"))
         kind = next(({role: kind} for role, kind, made in kinds if name in {item.name for item in fields(made)}), {})
         more = {} if name in preset.quantities() else kind | needed.get(name, {})
         calls[f"{preset.name}, {more}"] = partial(preset.override, **more), [name]
-        calls[f"ClusterEnv, {preset.name}, {more}"] = partial(ClusterEnv, preset if preset != TINY else "PreDC-v0", **more), [name]
+        calls[f"ClusterEnv, {preset.name}, {more}"] = (
+            partial(ClusterEnv, preset if preset != TINY else "PreDC-v0", **more),
+            [name],
+        )
     check(calls)
 
 

@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -120,6 +121,7 @@ def main(arguments: list[str] | None = None) -> int:
         Compile: run_compile,
     }
     commands: dict[str, Callable[..., Any]] = {kind.__name__.lower(): kind for kind in runs}
+    show_any_letter()
     command = tyro.extras.subcommand_cli_from_dict(commands, prog="wsn", args=arguments)
     folder = command.out if isinstance(command, (Evaluate, Calibrate)) else None
     try:
@@ -138,6 +140,13 @@ def main(arguments: list[str] | None = None) -> int:
         print("wsn: stopped" + ("; the same command continues where it was" if kept else ""), file=sys.stderr)
         return 130
     return 0
+
+
+def show_any_letter() -> None:
+    """On a terminal that lacks a letter a question mark stands for it: no result is lost for that."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 @contextmanager

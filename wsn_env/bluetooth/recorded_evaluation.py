@@ -12,6 +12,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,10 +20,11 @@ from wsn_env.bluetooth.fitting import calibrate, leave_one_out
 from wsn_env.evaluation.comparison import COLUMNS, Evaluation, evaluate, stem_of
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.kept_blocks import remove_kept_blocks
+from wsn_env.evaluation.policies import named_policies
 from wsn_env.evaluation.progress import Progress
 from wsn_env.evaluation.rollout import Engine
 from wsn_env.evaluation.versions import versions
-from wsn_env.models.arguments import checked
+from wsn_env.models.arguments import checked, checked_but
 from wsn_env.models.quantity import ScenarioError, whole_number
 from wsn_env.models.recordings.dataset import read_dataset, track_files, track_name
 from wsn_env.models.recordings.files import DatasetError
@@ -76,17 +78,17 @@ class RecordedEvaluation:
         """Write tracks.csv and tracks.json into a folder, each whole or not at all."""
         out = Path(out)
         out.mkdir(parents=True, exist_ok=True)
-        with replacing(out / "tracks.csv") as path, open(path, "w", newline="") as file:
+        with replacing(out / "tracks.csv") as path, open(path, "w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, ["track", *COLUMNS], lineterminator="\n")
             writer.writeheader()
             for name, each in self.by_track.items():
                 writer.writerows({"track": name} | row for row in each.rows)
         settings = {name: each.settings() for name, each in self.by_track.items()}
         with replacing(out / "tracks.json") as path:
-            path.write_text(json.dumps({"tracks": settings, "versions": versions()}, indent=1))
+            path.write_text(json.dumps({"tracks": settings, "versions": versions()}, indent=1), encoding="utf-8")
 
 
-@checked
+@checked_but("policies", "lams", "seeds", "seed")
 def evaluate_recorded(  # noqa: PLR0913
     policies: str | Sequence[str],
     scenario: Scenario,
@@ -128,11 +130,13 @@ def evaluate_recorded(  # noqa: PLR0913
     if not calibrated:
         for track, without in zip(tracks, leave_one_out(tracks)):
             scenarios[track.name] = scenario.override(**without.quantities)
+    scenarios = {name: _replay_track(scenarios[name], name, path) for name, path in paths.items()}
+    named = {name: named_policies(insert_track_name(policies, name), scenarios[name]) for name in paths}
     evaluations = {}
-    for number, (name, path) in enumerate(paths.items()):
+    for number, name in enumerate(paths):
         evaluations[name] = evaluate(
-            insert_track_name(policies, name),
-            _replay_track(scenarios[name], name, path),
+            named[name],
+            scenarios[name],
             lams,
             seeds,
             seed,
@@ -143,9 +147,11 @@ def evaluate_recorded(  # noqa: PLR0913
     return RecordedEvaluation(evaluations, tuple(track.note for track in tracks if track.note))
 
 
-def insert_track_name(policies: str | Sequence[str], track: str) -> list[str]:
+def insert_track_name(policies: Any, track: str) -> Any:
     """Names of policies, with the track's for {track}."""
     policies = [policies] if isinstance(policies, str) else policies
+    if not isinstance(policies, Sequence):
+        return policies  # policies by label, or what `named_policies` refuses
     return [policy.replace("{track}", track) if isinstance(policy, str) else policy for policy in policies]
 
 

@@ -26,7 +26,7 @@ from wsn_env.evaluation.policies import Policy, named_policies
 from wsn_env.evaluation.progress import Progress
 from wsn_env.evaluation.rollout import BLOCK, Block, Engine, change_lam, evaluation_seeds, in_this_process
 from wsn_env.evaluation.versions import versions
-from wsn_env.models.arguments import checked
+from wsn_env.models.arguments import checked, checked_but
 from wsn_env.models.quantity import NUMBERS, short, suggest
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.reference import has_reference
@@ -128,7 +128,7 @@ class Evaluation:
         """Write evaluation.csv and evaluation.json into a folder, each whole or not at all."""
         out = Path(out)
         out.mkdir(parents=True, exist_ok=True)
-        with replacing(out / "evaluation.csv") as path, open(path, "w", newline="") as file:
+        with replacing(out / "evaluation.csv") as path, open(path, "w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
             writer.writeheader()
             writer.writerows(self.rows)
@@ -141,7 +141,9 @@ class Evaluation:
             for policy in self.policies
         ]
         with replacing(out / "evaluation.json") as path:
-            path.write_text(json.dumps(self.settings() | {"versions": versions(), "means": means}, indent=1))
+            path.write_text(
+                json.dumps(self.settings() | {"versions": versions(), "means": means}, indent=1), encoding="utf-8"
+            )
 
     def _compare_to_reference(self, policy: str, lam: float) -> dict[str, object]:
         ratio = self.rms_over_reference(policy, lam)
@@ -159,7 +161,7 @@ def stem_of(policy: str) -> str:
     return policy.rstrip("0123456789")
 
 
-@checked
+@checked_but("policies", "lams", "episodes", "seed", "threads")
 def evaluate(  # noqa: PLR0913
     policies: str | Sequence[str] | dict[str, Policy],
     scenario: Scenario | str,

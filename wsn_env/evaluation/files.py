@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryFile
 
 LOCK_FILE = ".wsn.lock"
 
@@ -29,6 +30,10 @@ def replacing(path: str | Path) -> Iterator[Path]:
     try:
         yield temporary
         os.replace(temporary, path)
+    except OSError as problem:
+        if problem.errno is None or str(problem.filename or temporary) != str(temporary):
+            raise
+        raise OSError(problem.errno, problem.strerror, str(path)) from None  # a full disk does not name the file
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -46,6 +51,22 @@ def check_replaceable(path: str | Path) -> None:
         raise ValueError(f"{path}: is a folder: must be a regular file, or not exist yet")
     if path.exists() and not path.is_file():
         raise ValueError(f"{path}: is a device or a pipe: must be a regular file, or not exist yet")
+
+
+def check_writable(path: str | Path) -> None:
+    """Make the folder of a file to be, and see that the file can be written there, before time is spent.
+
+    Raises:
+        ValueError: it cannot, or something is there that must not be replaced.
+    """
+    path = Path(path)
+    check_replaceable(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=path.parent):
+            pass
+    except OSError as problem:
+        raise _not_writable(path.parent, problem) from None
 
 
 @contextmanager

@@ -25,7 +25,7 @@ from wsn_env.evaluation.comparison import Evaluation, stem_of
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.intervals import RESAMPLES, Summary
 from wsn_env.evaluation.versions import versions
-from wsn_env.models.arguments import checked
+from wsn_env.models.arguments import checked, checked_but
 from wsn_env.models.quantity import whole_number
 from wsn_env.scenario import Scenario
 
@@ -64,7 +64,7 @@ class Volume:
     difference: Summary | None
 
 
-@checked
+@checked_but("number")
 def lam_sweep(scenario: Scenario, number: int = 9) -> tuple[float, ...]:
     """Trade-offs, evenly spaced in their logarithm, over the scenario's span [m/mJ]: 0.3 to 30 for PreDC-v0.
 
@@ -173,7 +173,7 @@ def save_front(evaluation: Evaluation, fronts: Fronts, volumes: list[Volume], ou
 
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
-    with replacing(out / "front.csv") as path, open(path, "w", newline="") as file:
+    with replacing(out / "front.csv") as path, open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COLUMNS)
         for name, points in fronts.items():
@@ -193,7 +193,7 @@ def save_front(evaluation: Evaluation, fronts: Fronts, volumes: list[Volume], ou
     }
     made_by = {"versions": versions() | {"moocore": moocore.__version__}}
     with replacing(out / "front.json") as path:
-        path.write_text(json.dumps(evaluation.settings() | made_by | found, indent=1))
+        path.write_text(json.dumps(evaluation.settings() | made_by | found, indent=1), encoding="utf-8")
 
 
 def check_front_libraries(pictures: bool) -> None:

@@ -138,21 +138,30 @@ def _parse_parameters(colon: str, text: str) -> dict:
 
 
 def _create_policy(name: str, maker, scenario: Scenario, parameters: dict) -> Policy:
+    wrong = None
     kind = getattr(maker, "func", maker)  # of a partial
     if getattr(kind, "__module__", "").startswith("wsn_env."):  # in files of one's own annotations may be anything
         try:
             parameters = check_parameters(kind, parameters)
-        except ValueError as problem:
-            raise ValueError(f"policy {name!r}: {problem}") from None
+        except ValueError as problem:  # said where the class itself does not say more
+            wrong = ValueError(f"policy {name!r}: {problem}")
     try:
         policy = maker(scenario=scenario, **parameters)
-    except TypeError as problem:
-        told = f"cannot be made with a scenario and its parameters: {problem}{_suggest_parameter(maker, parameters)}"
-        raise ValueError(f"policy {name!r}: {own_place(problem)}{told}") from problem
     except Exception as problem:
-        if isinstance(problem, ValueError) or not own_place(problem):
+        if isinstance(problem, ValueError):
+            raise
+        if wrong:
+            raise wrong from None
+        if isinstance(problem, TypeError):
+            told = (
+                f"cannot be made with a scenario and its parameters: {problem}{_suggest_parameter(maker, parameters)}"
+            )
+            raise ValueError(f"policy {name!r}: {own_place(problem)}{told}") from problem
+        if not own_place(problem):
             raise
         raise ValueError(f"policy {name!r}: {own_error(problem)}") from problem
+    if wrong:
+        raise wrong
     if not callable(getattr(policy, "act", None)):
         raise ValueError(f"policy {name!r}: has no act(view)")
     return policy
@@ -177,7 +186,7 @@ def read_saved(path: Path, key: str) -> Any:
     if not path.is_file():
         raise ValueError(f"{path} is not a saved policy: there is no such file")
     try:
-        return json.loads(path.read_text())[key]
+        return json.loads(path.read_text(encoding="utf-8"))[key]
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as problem:
         raise ValueError(f"{path} is not a saved policy: {problem!r}") from None
 

@@ -38,12 +38,12 @@ def open_folder(folder: Path, settings: dict[str, Any], resume: bool) -> None:
                 raise ValueError(f"{folder} was begun with {name} = {old.get(name)!r}: cannot resume it with {value!r}")
     folder.mkdir(parents=True, exist_ok=True)
     with replacing(path) as temporary:
-        temporary.write_text(json.dumps(settings, indent=1))
+        temporary.write_text(json.dumps(settings, indent=1), encoding="utf-8")
 
 
 def _read_config(path: Path) -> dict[str, Any]:
     try:
-        old = json.loads(path.read_text()) if path.is_file() else None
+        old = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
     except (ValueError, RecursionError):
         old = None
     if not isinstance(old, dict):

@@ -32,30 +32,41 @@ WORDS = {
 }
 
 
-def checked(function: Callable[P, R]) -> Callable[P, R]:
+def checked_but(*own: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """A function that refuses arguments of other types than its annotations tell, before it does anything.
 
-    NumPy's scalars and arrays of no dimension become Python's numbers. Annotations that say nothing here, such as Any
-    or a protocol, are left to the function.
+    NumPy's scalars and arrays of no dimension become Python's numbers. Annotations that say nothing here, such as Any,
+    are left to the function.
+
+    Args:
+        own: arguments that the function checks itself, in words that tell more.
 
     Raises:
         ValueError: names the argument, its value and what is allowed.
     """
-    taken = signature(function)
-    named = {name for name, each in taken.parameters.items() if each.kind is not Parameter.VAR_KEYWORD}
 
-    @wraps(function)
-    def call(*args: P.args, **kwargs: P.kwargs) -> R:
-        try:
-            given = taken.bind(*args, **kwargs)
-        except TypeError:  # too many, too few: Python says it better
-            return function(*args, **kwargs)
-        hints = hints_of(function)
-        for name in named & given.arguments.keys() & hints.keys():
-            given.arguments[name] = check_argument(name, given.arguments[name], hints[name])
-        return function(*given.args, **given.kwargs)
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        taken = signature(function)
+        kinds = {name: each.kind for name, each in taken.parameters.items()}
+        named = {name for name, kind in kinds.items() if kind is not Parameter.VAR_KEYWORD} - set(own)
 
-    return call
+        @wraps(function)
+        def call(*args: P.args, **kwargs: P.kwargs) -> R:
+            try:
+                given = taken.bind(*args, **kwargs)
+            except TypeError:  # too many, too few: Python says it better
+                return function(*args, **kwargs)
+            hints = hints_of(function)
+            for name in named & given.arguments.keys() & hints.keys():
+                given.arguments[name] = check_argument(name, given.arguments[name], hints[name])
+            return function(*given.args, **given.kwargs)
+
+        return call
+
+    return decorate
+
+
+checked = checked_but()
 
 
 def check_parameters(owner: Any, given: dict[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -56,7 +56,7 @@ def prepare_folder(out: Path) -> None:
 
 def write_sheet(path: Path, sheet: Sheet) -> None:
     """A table as CSV; numbers with six digits, None and NaN as an empty cell."""
-    with replacing(path) as temporary, open(temporary, "w", newline="") as file:
+    with replacing(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(sheet.columns)
         table.writerows([_cell(value) for value in row] for row in sheet.rows)

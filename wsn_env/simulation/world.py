@@ -11,7 +11,7 @@ from wsn_env.compiled import kernels
 from wsn_env.compiled.kernels import available_threads, over_rows, threads_for
 from wsn_env.filters import make_tracker
 from wsn_env.filters.particle import ParticleTracker
-from wsn_env.models.arguments import check_argument, checked
+from wsn_env.models.arguments import check_argument, checked_but
 from wsn_env.models.quantity import short, whole_number
 from wsn_env.models.state import OUTCOME, Cluster, Grid, Outcome, State, Tracker
 from wsn_env.scenario import Scenario
@@ -24,7 +24,7 @@ LONG_LIST = 64
 class World:
     """A scenario brought to life. Holds no state of its own: every method is a function of its arguments."""
 
-    @checked
+    @checked_but("threads")
     def __init__(self, scenario: Scenario | str, threads: int | None = None, fast: bool = False) -> None:
         """Prepare a scenario.
 
