@@ -28,14 +28,22 @@ def replacing(path: str | Path) -> Iterator[Path]:
     _remove_temporary_files_of_dead_processes(path)
     temporary = path.with_name(f".{os.getpid()}.{path.name}")
     try:
-        yield temporary
-        os.replace(temporary, path)
-    except OSError as problem:
-        if problem.errno is None or str(problem.filename or temporary) != str(temporary):
-            raise
-        raise OSError(problem.errno, problem.strerror, str(path)) from None  # a full disk does not name the file
+        with naming(path, temporary):
+            yield temporary
+            os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def naming(path: str | Path, temporary: Path | None = None) -> Iterator[None]:
+    """What goes wrong with a file names it: a full disk does not. The temporary name is no user's."""
+    try:
+        yield
+    except OSError as problem:
+        if problem.errno is None or problem.filename not in (None, temporary, str(temporary)):
+            raise
+        raise OSError(problem.errno, problem.strerror, str(path)) from None
 
 
 def check_replaceable(path: str | Path) -> None:
@@ -122,8 +130,12 @@ def _lock(path: Path) -> int:
         try:
             _try_to_lock(file)
             if _same_file(file, path):
-                os.ftruncate(file, 0)
-                os.write(file, str(os.getpid()).encode())
+                try:
+                    os.ftruncate(file, 0)
+                    os.write(file, str(os.getpid()).encode())
+                except OSError as problem:
+                    path.unlink()
+                    raise _not_writable(path.parent, problem) from None
                 return file
         except BlockingIOError:
             process = os.read(file, 20).decode(errors="replace").strip()
