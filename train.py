@@ -42,6 +42,7 @@ from wsn_env.learning.replayable import ReplayableRows
 from wsn_env.learning.run_folder import facts_of, open_folder, open_progress
 from wsn_env.learning.sb3 import SB3VecEnv
 from wsn_env.learning.training_reward import TrainingReward
+from wsn_env.models.arguments import check_parameters
 from wsn_env.models.measurement.base import Order
 from wsn_env.models.own import own_error, own_place
 from wsn_env.models.quantity import check_quantity, parse_overrides
@@ -172,6 +173,8 @@ def main(arguments: list[str] | None = None) -> int:
 
 def train(settings: Training) -> None:
     """The whole story."""
+    for name, value in check_parameters(Training, vars(settings), "train.py: ").items():
+        setattr(settings, name, value)
     scenario = complete_settings(settings)
     check_settings(settings)
     rules = make_baselines(scenario) if settings.episodes else {}
@@ -314,11 +317,12 @@ def check_settings(settings: Training) -> None:
     if settings.engine == "ray" and settings.network != "entries":
         raise ValueError(f"Training.network = {settings.network!r}: the engine ray trains only 'entries'")
     if settings.address and settings.engine != "ray":
-        raise ValueError(f"Training.address = {settings.address!r}: only with --engine ray")
+        raise ValueError(f"Training.address = {settings.address!r}: must be left out but with --engine ray")
     # Every seed that training may use lies below those of evaluations.
     most = FIRST_SEED - settings.steps - settings.rows
     check_quantity("Training", "seed", settings.seed, at_least=0, at_most=most, whole=True)
     if settings.episodes:
+        check_quantity("Training", "evaluation_seed", settings.evaluation_seed, at_least=0, at_most=9999, whole=True)
         evaluation_seeds(settings.evaluation_seed, settings.episodes)
 
 

@@ -36,7 +36,7 @@ class Adaptive(ViewPolicy):
     """
 
     order: str = "nearest"
-    switches: Sequence[Switch] | None = None  # None: tuned for the scenario's name and order; else a usual one
+    switches: Sequence[Sequence[float]] | None = None  # None: tuned for the scenario's name and order; else a usual one
 
     def __post_init__(self) -> None:
         check_order(self.order)
@@ -56,7 +56,7 @@ class Adaptive(ViewPolicy):
         table = np.array(self.switches)
         _, few, many, spread_m, hysteresis_m = table[nearest_lam(table[:, 0], view.lam)].T
         sizes = np.where(view.spread_m > spread_m, many, few).astype(int)
-        most = max(each.many for each in self.switches or ())
+        most = max(Switch(*each).many for each in self.switches or ())
         return surround(view, self.scenario, self.order, hysteresis_m, sizes, most)
 
 

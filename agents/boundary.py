@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wsn_env.agents.base import ViewPolicy
+from wsn_env.models.quantity import check_quantity
 from wsn_env.models.state import Cluster
 from wsn_env.simulation.view import View
 
@@ -22,6 +23,11 @@ class Boundary(ViewPolicy):
 
     width_m: float = 5.0
     sds: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_quantity("Boundary", "width_m", self.width_m, at_least=0)
+        check_quantity("Boundary", "sds", self.sds, at_least=0)
+
     sees_lam = False
 
     def act(self, view: View) -> Cluster:

@@ -44,7 +44,7 @@ class Greedy(ViewPolicy):
     make up for the handover. Each row takes the terms whose lam is nearest to its own on the logarithmic scale.
     """
 
-    terms: Sequence[Terms] | None = None  # None: tuned for the scenario's name; else usual ones
+    terms: Sequence[Sequence[float]] | None = None  # None: tuned for the scenario's name; else usual ones
 
     def __post_init__(self) -> None:
         chosen: Sequence[Any] | None = self.terms

@@ -20,6 +20,7 @@ from wsn_env.envs.interface import Interface, Settings
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.policies import read_saved
 from wsn_env.learning.network import EntryNetwork, FlatNetwork, PolicyNetwork
+from wsn_env.models.arguments import checked
 from wsn_env.models.own_files import file_digest
 from wsn_env.models.state import Cluster
 from wsn_env.simulation.view import View
@@ -34,7 +35,7 @@ class PPOPolicy(ViewPolicy):
     """Takes the most probable action of the network that `train.py` saved at `path` (a policy.json); left out: of the
     one that comes with the package for the scenario of this name."""
 
-    path: str = ""
+    path: str | Path = ""
 
     def __post_init__(self) -> None:
         """Read the files now: a missing one is known before anybody plays."""
@@ -43,7 +44,7 @@ class PPOPolicy(ViewPolicy):
     def __repr__(self) -> str:
         """Tells it from others by what it has learned."""
         weights = b"".join(array.tobytes() for array in self._interface_and_network[1].arrays.values())
-        return f"PPOPolicy({self.path!r}, weights {hashlib.sha256(weights).hexdigest()[:16]})"
+        return f"PPOPolicy({str(self.path)!r}, weights {hashlib.sha256(weights).hexdigest()[:16]})"
 
     def __getstate__(self) -> dict[str, Any]:
         """It takes its network along to machines that lack the file."""
@@ -90,6 +91,7 @@ def _logit_counts(space: Any) -> list[int]:
     return [space.n] if isinstance(space, Discrete) else list(space.nvec)
 
 
+@checked
 def save_policy(folder: str | Path, network: PolicyNetwork, settings: Settings, facts: dict[str, Any]) -> Path:
     """Write policy.safetensors and policy.json; the latter last, so that a policy.json always has its network.
 
@@ -102,8 +104,7 @@ def save_policy(folder: str | Path, network: PolicyNetwork, settings: Settings, 
     Returns: path of policy.json.
     """
     folder = Path(folder)
-    with replacing(folder / "policy.safetensors") as path:
-        network.save(path)
+    network.save(folder / "policy.safetensors")
     said = {"kind": "ppo", "interface": asdict(settings), DIGEST: file_digest(folder / "policy.safetensors")}
     with replacing(folder / "policy.json") as path:
         path.write_text(json.dumps(said | facts, indent=1), encoding="utf-8")

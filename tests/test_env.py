@@ -315,6 +315,17 @@ def test_actions_are_whole_numbers():
         envs.step(np.array([3.7, 2.2]))
 
 
+@pytest.mark.parametrize(("action", "given"), [("menu", True), ("menu", np.int8(3)), ("nodes", "mask")])
+def test_what_the_space_contains_is_an_action(action, given):
+    """Python's True, too, which is 1 to a Discrete space; and a mask of the nodes."""
+    env, twin = (ClusterEnv(action=action, **SMALL) for _ in range(2))
+    given = np.arange(SMALL["nodes"]) < 3 if isinstance(given, str) else given
+    assert action == "nodes" or env.action_space.contains(given)
+    for each in (env, twin):
+        each.reset(seed=0)
+    assert same(env.step(given), twin.step(np.asarray(given).astype(int)))
+
+
 def test_stepping_at_the_wrong_time_says_reset():
     env = ClusterEnv(**SMALL)
     with pytest.raises(gym.error.ResetNeeded):

@@ -354,16 +354,24 @@ def test_temporary_files_of_killed_processes_go_and_others_stay(tmp_path):
 
 
 KILLED = """
-import os, signal, sys
+import os, random, signal, sys, time
 from pathlib import Path
+from matplotlib.figure import Figure
 from wsn_env.cli import main
 
-folder, moments, arguments = Path(sys.argv[1]), map(int, sys.argv[2].split()), sys.argv[3:]
+folder, moments, arguments = Path(sys.argv[1]), sys.argv[2].split(), sys.argv[3:]
+save, quick = Figure.savefig, moments[0] == "quick"
+def draw(self, target, **more):
+    if not quick:
+        save(self, target, **more | {"dpi": 20})
+    else:
+        Path(target).write_bytes(b"a picture")
+Figure.savefig = draw
 def files(out):
     return {path.name: path.read_bytes() for path in sorted(out.iterdir())}
 def run(out):
-    return main([*arguments, "--out", str(out)])
-def forked(out, last):
+    return main([argument.replace("OUT", str(out)) for argument in arguments])
+def forked(out, last, seconds=None):
     child = os.fork()
     if child == 0:
         count = 0
@@ -374,22 +382,53 @@ def forked(out, last):
                 if count == last:
                     os.kill(os.getpid(), signal.SIGKILL)
         sys.addaudithook(watch)
-        run(out)
-        print("moments", count, file=sys.stderr, flush=True)
-        os._exit(0)
+        status = run(out)
+        (folder / "count").write_text(str(count))
+        os._exit(status)
+    if seconds is not None:
+        time.sleep(seconds)
+        os.kill(child, signal.SIGKILL)
     return os.waitpid(child, 0)[1]
 
-assert run(folder / "whole") == 0
-whole = files(folder / "whole")
+assert run(folder / "first") == 0  # imports, kernels
+whole = files(folder / "first")
+if quick:
+    moments = moments[1:]
+elif moments[0] == "random":  # by turns at a file and at a time
+    started = time.monotonic()
+    assert forked(folder / "whole", 0) == 0
+    seconds, count, rng = time.monotonic() - started, int((folder / "count").read_text()), random.Random(22)
+    assert files(folder / "whole") == whole
+    number = int(moments[1])
+    moments = [rng.randint(1, count) if k % 2 else rng.uniform(0.02, 0.98) * seconds for k in range(number)]
 killed = 0
-for moment in moments:
-    out = folder / str(moment)
-    status = forked(out, moment)
+for number, moment in enumerate(moments):
+    out = folder / str(number)
+    out.mkdir()
+    status = forked(out, 0, moment) if isinstance(moment, float) else forked(out, int(moment))
     killed += os.WIFSIGNALED(status)
     assert forked(out, 0) == 0
-    assert files(out) == whole, (moment, files(out).keys() ^ whole.keys())
+    made = files(out)
+    assert made == whole, (moment, [name for name in made.keys() | whole.keys() if made.get(name) != whole.get(name)])
 print("killed", killed)
 """
+
+
+def kill(moments, command, folder):
+    """Kill a command at some files that it opens, renames or removes, and see that run again it writes the same.
+
+    Args:
+        moments: "2 5": at the second and the fifth; "quick 2 5": with pictures that are none; "random 10": ten, half
+            of them at a time instead.
+        command: of `wsn`, with OUT for its folder.
+        folder: a temporary one.
+
+    Returns: how many were killed before their end.
+    """
+    ran = [sys.executable, "-c", KILLED, str(folder), moments, *command]
+    done = subprocess.run(ran, capture_output=True, text=True, timeout=3000)
+    assert done.returncode == 0, done.stderr[-2000:]
+    return int(done.stdout.split()[-1])
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="kills forks of itself")
@@ -405,11 +444,25 @@ print("killed", killed)
 )
 def test_killed_at_any_file_the_same_command_ends_with_the_same_bytes(more, moments, tmp_path):
     policies = ["nearest0", "nearest1", "pre_dc"]
-    command = ["evaluate", "--policies", *policies, "--episodes", "4", *more, *SMALL]
-    ran = [sys.executable, "-c", KILLED, str(tmp_path), moments, *command]
-    done = subprocess.run(ran, capture_output=True, text=True, timeout=1000)
-    assert done.returncode == 0, done.stderr[-2000:]
-    assert done.stdout.split()[-2:] == ["killed", str(len(moments.split()))], done.stderr[-500:]
+    command = ["evaluate", "--policies", *policies, "--episodes", "4", *more, *SMALL, "--out", "OUT"]
+    assert kill(moments, command, tmp_path) == len(moments.split())
+
+
+OTHERS = {  # commands that keep no blocks
+    "replay": ["replay", "--policy", "nearest0", "pre_dc", *SMALL, "--out", "OUT/page.html"],
+    "calibrate": ["calibrate", "--tracks", "DATA", "--out", "OUT"],
+    "reproduce": ["reproduce", "underwater", "--runs", "2", "--out", "OUT"],
+}
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="kills forks of itself")
+@pytest.mark.parametrize(
+    "moments", ["quick 2 3", pytest.param("random 12", marks=[pytest.mark.slow, pytest.mark.full])], ids=["few", "many"]
+)
+@pytest.mark.parametrize("name", OTHERS)
+def test_other_commands_killed_at_any_moment_end_with_the_same_bytes(name, moments, dataset, tmp_path):
+    command = [argument.replace("DATA", str(dataset[0])) for argument in OTHERS[name]]
+    assert kill(moments, command, tmp_path) >= (2 if moments == "quick 2 3" else 6)
 
 
 def test_results_are_saved_before_tables_are_printed(tmp_path, monkeypatch, capsys):

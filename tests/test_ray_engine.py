@@ -1,14 +1,19 @@
 """Evaluation on a Ray cluster: the local rows to the byte, whoever is killed."""
 
+import contextlib
 import os
 import pickle
 import signal
+import subprocess
+import sys
+import time
 
 import pytest
 
 from wsn_env import Scenario, evaluate, make_policy
 from wsn_env.agents.ppo import PPOPolicy
 from wsn_env.cli import main
+from wsn_env.evaluation.kept_blocks import BLOCKS_FILE
 from wsn_env.evaluation.ray_engine import on_ray
 from wsn_env.evaluation.rollout import BLOCK
 
@@ -182,3 +187,45 @@ def test_relative_paths_and_files_beside_an_own_one_reach_workers_begun_elsewher
                 evaluate(["nearest2"], SCENARIO, [4.0], 2, engine=on_ray())
     finally:
         ray.shutdown()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("process", ["gcs_server", "raylet"])
+def test_a_lost_cluster_is_a_line_and_the_same_command_continues(process, tmp_path, monkeypatch):
+    pytest.importorskip("ray")
+    from ray.cluster_utils import Cluster
+
+    monkeypatch.setenv("RAY_ENABLE_UV_RUN_RUNTIME_ENV", "0")
+    policies = ["nearest0", "nearest1", "nearest2", "nearest3", "centroid"]
+    small = ["--set", "particles=300", "nodes=40", "periods=60"]
+    command = [sys.executable, "-m", "wsn_env", "evaluate", "--policies", *policies, "--episodes", "300", *small]
+
+    def begin(out, cluster):
+        ray = ["--engine", "ray", "--address", cluster.address, "--out", str(out)]
+        return subprocess.Popen([*command, *ray], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    blocks = tmp_path / "out" / BLOCKS_FILE
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    run = begin(tmp_path / "out", cluster)
+    while run.poll() is None and not (blocks.exists() and blocks.read_bytes().count(b"\n") >= 3):
+        time.sleep(0.1)
+    for each in cluster.head_node.all_processes[process]:
+        os.kill(each.process.pid, signal.SIGKILL)
+    _, said = run.communicate(timeout=100)
+    with contextlib.suppress(Exception):  # parts of it are dead
+        cluster.shutdown()
+    assert run.returncode == 2 and said.count("\n") == 1
+    assert said.startswith("wsn: engine 'ray': the cluster is lost (") and "the same command continues" in said
+    kept = blocks.read_bytes().splitlines()
+    assert 3 <= len(kept) < 30
+
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    run, other = begin(tmp_path / "out", cluster), tmp_path / "other"
+    while run.poll() is None and not (blocks.exists() and len(blocks.read_bytes().splitlines()) > len(kept)):
+        time.sleep(0.1)
+    assert not blocks.exists() or set(kept) <= set(blocks.read_bytes().splitlines())
+    assert run.wait(timeout=200) == 0
+    cluster.shutdown()
+    assert main([*command[3:], "--out", str(other)]) == 0
+    for name in ("evaluation.csv", "evaluation.json", "evaluation.md"):
+        assert (tmp_path / "out" / name).read_bytes() == (other / name).read_bytes()

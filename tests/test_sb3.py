@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
+from stable_baselines3 import PPO
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import DummyVecEnv, VecFrameStack
@@ -198,3 +199,12 @@ def test_calibrated_rewards_cost_what_the_true_errors_do_among_sharp_and_wide_be
     assert given == pytest.approx(true, rel=0.02)
     with pytest.raises(ValueError, match="Disabled"):
         TrainingReward(ClusterVectorEnv(2, autoreset_mode="SameStep", **SMALL), calibrated=True)
+
+
+def test_ppo_learns_from_the_view():
+    """Its observation has no Discrete that begins below 0, which stable-baselines3 cannot encode."""
+    envs = SB3VecEnv(ClusterVectorEnv(2, observation="view", autoreset_mode="SameStep", **SMALL))
+    model = PPO("MultiInputPolicy", envs, n_steps=16, batch_size=16, n_epochs=1, seed=0, device="cpu")
+    model.learn(32)
+    observation, _ = ClusterEnv(observation="view", **SMALL).reset(seed=1)
+    assert observation["head"].shape == (1,) and model.predict(observation)[0].shape == ()

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from wsn_env.evaluation.files import replacing
+from wsn_env.models.arguments import checked
 from wsn_env.models.recordings.calibration_file import KIND, VERSION, read_calibration
 
 
@@ -53,6 +54,7 @@ class Calibration:
         main = q["main_db"] ** 2 + q["main_sd_db"] ** 2
         return sqrt((1 - q["fade_share"]) * main + q["fade_share"] * (q["fade_db"] ** 2 + q["fade_sd_db"] ** 2))
 
+    @checked
     def save(self, path: str | Path) -> None:
         """Write a JSON file."""
         content = {"kind": KIND, "version": VERSION, "tracks": list(self.tracks), "left_out": self.left_out}
@@ -61,6 +63,7 @@ class Calibration:
             temporary.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
     @classmethod
+    @checked
     def load(cls, path: str | Path) -> Calibration:
         """Read what `save` wrote; whatever is wrong raises CalibrationError."""
         content = read_calibration(path)

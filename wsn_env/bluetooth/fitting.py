@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from math import log, sqrt
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
@@ -20,12 +20,11 @@ from wsn_env.bluetooth.calibration import Calibration
 from wsn_env.bluetooth.covariance import LEAST_BIAS, autocovariance, fit_bias, lagged_covariance
 from wsn_env.bluetooth.losses import measure_losses
 from wsn_env.bluetooth.packets import Packets, concatenate_tracks
+from wsn_env.models.arguments import checked
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.models.recordings.calibration_file import QUANTITIES, SCALARS, CalibrationError, check_quantities
-
-if TYPE_CHECKING:
-    from wsn_env.models.recordings.dataset import Track
-    from wsn_env.models.recordings.receivers import Receivers
+from wsn_env.models.recordings.dataset import Track
+from wsn_env.models.recordings.receivers import Receivers
 
 EXPONENT_SD = 0.3  # of a receiver's exponent about the common one, before the receiver is heard
 EXPONENT_NOISE_DB = 5.3 * sqrt(8)  # sd of a level for this purpose: eight neighbouring packets tell as much as one
@@ -38,6 +37,7 @@ BIAS_S = (2.0, 15.0)
 DECIMALS = 6
 
 
+@checked
 def calibrate(tracks: Sequence[Track]) -> Calibration:
     """Estimate all quantities from recorded tracks that share their receivers.
 

@@ -12,6 +12,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,10 +20,12 @@ from wsn_env.bluetooth.fitting import calibrate, leave_one_out
 from wsn_env.evaluation.comparison import COLUMNS, Evaluation, evaluate, stem_of
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.kept_blocks import remove_kept_blocks
+from wsn_env.evaluation.policies import named_policies
 from wsn_env.evaluation.progress import Progress
 from wsn_env.evaluation.rollout import Engine
 from wsn_env.evaluation.versions import versions
-from wsn_env.models.quantity import ScenarioError
+from wsn_env.models.arguments import checked, checked_but
+from wsn_env.models.quantity import ScenarioError, whole_number
 from wsn_env.models.recordings.dataset import read_dataset, track_files, track_name
 from wsn_env.models.recordings.files import DatasetError
 from wsn_env.scenario import Scenario
@@ -85,11 +88,12 @@ class RecordedEvaluation:
             path.write_text(json.dumps({"tracks": settings, "versions": versions()}, indent=1), encoding="utf-8")
 
 
+@checked_but("policies", "lams", "seeds", "seed")
 def evaluate_recorded(  # noqa: PLR0913
-    policies: Sequence[str],
+    policies: str | Sequence[str],
     scenario: Scenario,
     folder: str | Path,
-    lams: Sequence[float] | None = None,
+    lams: float | Sequence[float] | None = None,
     seeds: int = 10,
     seed: int = 0,
     keep: str | Path | None = None,
@@ -114,6 +118,7 @@ def evaluate_recorded(  # noqa: PLR0913
         ValueError: another scenario, nothing to read, or too few tracks to leave one out.
     """
     _check_receivers(scenario)
+    seeds = whole_number("seeds", seeds, 1)
     paths = {track_name(path): path for path in track_files(folder)}
     scenarios = {name: scenario for name in paths}
     if not calibrated:
@@ -125,11 +130,13 @@ def evaluate_recorded(  # noqa: PLR0913
     if not calibrated:
         for track, without in zip(tracks, leave_one_out(tracks)):
             scenarios[track.name] = scenario.override(**without.quantities)
+    scenarios = {name: _replay_track(scenarios[name], name, path) for name, path in paths.items()}
+    named = {name: named_policies(insert_track_name(policies, name), scenarios[name]) for name in paths}
     evaluations = {}
-    for number, (name, path) in enumerate(paths.items()):
+    for number, name in enumerate(paths):
         evaluations[name] = evaluate(
-            insert_track_name(policies, name),
-            _replay_track(scenarios[name], name, path),
+            named[name],
+            scenarios[name],
             lams,
             seeds,
             seed,
@@ -140,12 +147,15 @@ def evaluate_recorded(  # noqa: PLR0913
     return RecordedEvaluation(evaluations, tuple(track.note for track in tracks if track.note))
 
 
-def insert_track_name(policies: str | Sequence[str], track: str) -> list[str]:
+def insert_track_name(policies: Any, track: str) -> Any:
     """Names of policies, with the track's for {track}."""
     policies = [policies] if isinstance(policies, str) else policies
+    if not isinstance(policies, Sequence):
+        return policies  # policies by label, or what `named_policies` refuses
     return [policy.replace("{track}", track) if isinstance(policy, str) else policy for policy in policies]
 
 
+@checked
 def replay_scenario(scenario: Scenario, path: str | Path, calibrated: bool = False) -> Scenario:
     """The replay of one track, calibrated on the others of its folder if there are any.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -12,16 +11,16 @@ from scipy.linalg import cho_factor, cho_solve
 from wsn_env.bluetooth.calibration import Calibration
 from wsn_env.bluetooth.packets import concatenate_tracks, residuals
 from wsn_env.evaluation.files import replacing
+from wsn_env.models.arguments import checked
 from wsn_env.models.recordings.calibration_file import CalibrationError
+from wsn_env.models.recordings.dataset import Track
 from wsn_env.models.recordings.replay import CELL_M, map_cells
-
-if TYPE_CHECKING:
-    from wsn_env.models.recordings.dataset import Track
 
 VARIANCE, LENGTH_M = 5.0, 1.5  # of the field, dB^2 and m
 SHARED_NOISE, PACKET_NOISE = 3.0, 18.0  # dB^2 of a cell's mean: drift, and white part over the number of packets
 
 
+@checked
 def residual_map(tracks: Sequence[Track], calibration: Calibration) -> np.ndarray:
     """Mean of the field, conditioned on the residuals of the calibration's own tracks: Gaussian process regression.
 
@@ -53,6 +52,7 @@ def residual_map(tracks: Sequence[Track], calibration: Calibration) -> np.ndarra
     return np.array(fields, np.float32)
 
 
+@checked
 def save_map(field: np.ndarray, path: str | Path) -> None:
     """Write a map as .npz."""
     with replacing(path) as temporary, temporary.open("wb") as file:

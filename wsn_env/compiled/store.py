@@ -279,7 +279,8 @@ def _sign(folder: Path, anew: bool = False) -> None:
 @atexit.register
 def _sign_all() -> None:
     for folder in dict.fromkeys(_folders):
-        _sign(folder)
+        with suppress(OSError):
+            _sign(folder)
 
 
 class _Watch(event.Listener):

@@ -46,7 +46,7 @@ class MenuAction:
 
     def __init__(self, scenario: Scenario, order: Order, candidates: int) -> None:
         if candidates <= MENU_MEMBERS:
-            raise ValueError(f"candidates = {candidates}: the menu needs at least {MENU_MEMBERS + 1}")
+            raise ValueError(f"candidates = {candidates}: the menu must have at least {MENU_MEMBERS + 1}")
         self.space: spaces.Discrete = spaces.Discrete(MENU_ENTRIES)
         self._by, self._candidates, self._ring_m = ORDERS.index(order), candidates, scenario.ring_m
         self._expectations, self._constants = Expectations(scenario, candidates), common_constants(scenario)
@@ -229,6 +229,8 @@ class ClusterAction:
 def _whole_numbers(action: Any, space: Any, rows: int) -> np.ndarray:
     """The actions as an array (rows, ...) of integers."""
     array = _as_array(action, space)
+    if array.dtype.kind == "b":  # Discrete spaces contain Python's True, and a mask is a choice of nodes
+        array = array.astype(np.int64)
     if array.dtype.kind not in "iu" or array.shape != (rows, *space.shape):
         raise _refusal(action, space)
     return array

@@ -15,6 +15,7 @@ from wsn_env.envs.observations import ObservationName
 from wsn_env.envs.one_thread import Busy, one_thread
 from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera, RenderMode
 from wsn_env.envs.rewards import RewardName
+from wsn_env.models.arguments import checked_but
 from wsn_env.models.measurement.base import Order
 from wsn_env.models.quantity import whole_number
 from wsn_env.models.state import OUTCOME, Outcome, State
@@ -49,6 +50,7 @@ class ClusterEnv(gym.Env):
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": FPS}
 
+    @checked_but("candidates", "frame_px")
     def __init__(  # noqa: PLR0913
         self,
         scenario: str | Scenario = "PreDC-v0",

@@ -214,7 +214,7 @@ class ViewObservation:
                 "predicted_cov": box(-far, far, 4, 4),
                 "positions": box(0.0, side, nodes, 2),
                 "battery": box(0.0, scenario.radio.battery_j, nodes),
-                "head": spaces.Discrete(nodes + 1, start=-1),
+                "head": spaces.Box(-1, nodes - 1, (1,), np.int64),  # -1: none (learners want Discrete from 0)
                 "member": spaces.Box(0, 1, (nodes,), np.int8),
                 "detected": spaces.Box(0, 1, (nodes,), np.int8),
                 "measured": box(-far, far, nodes, 2),

@@ -18,6 +18,7 @@ from wsn_env.envs.observations import ObservationName
 from wsn_env.envs.one_thread import Busy, one_thread
 from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera, RenderMode
 from wsn_env.envs.rewards import RewardName
+from wsn_env.models.arguments import checked_but
 from wsn_env.models.measurement.base import Order
 from wsn_env.models.quantity import whole_number
 from wsn_env.models.state import State
@@ -45,6 +46,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
 
+    @checked_but("num_envs", "candidates", "frame_px", "threads")
     def __init__(  # noqa: PLR0913
         self,
         num_envs: int = 1,

@@ -9,6 +9,7 @@ import numpy as np
 from wsn_env.evaluation import rollout
 from wsn_env.evaluation.intervals import Measured
 from wsn_env.evaluation.policies import Policy, named_policies
+from wsn_env.models.arguments import checked_but
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.bound import Bound
 from wsn_env.simulation.world import World
@@ -23,6 +24,7 @@ class BoundedError(NamedTuple):
     bound_stderr_m: float  # the bound's expectations are means over the episodes, too; NaN with fewer than 100
 
 
+@checked_but("policy", "episodes", "seed")
 def error_bound(policy: Policy | str, scenario: Scenario | str, episodes: int = 1000, seed: int = 0) -> BoundedError:
     """Play a policy and bound the error of any tracker with its reports (`simulation/bound.py`).
 

@@ -26,6 +26,7 @@ from wsn_env.evaluation.policies import Policy, named_policies
 from wsn_env.evaluation.progress import Progress
 from wsn_env.evaluation.rollout import BLOCK, Block, Engine, change_lam, evaluation_seeds, in_this_process
 from wsn_env.evaluation.versions import versions
+from wsn_env.models.arguments import checked, checked_but
 from wsn_env.models.quantity import NUMBERS, short, suggest
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.reference import has_reference
@@ -61,11 +62,14 @@ class Evaluation:
             found.setdefault((str(row["policy"]), float(row["lam"])), []).append(row)
         return found
 
+    @checked
     def values(self, policy: str, lam: float, column: str) -> np.ndarray:
         """(episodes,) in the order of the seeds, so that two policies' values are pairs."""
         if (policy, lam) not in self._rows_of:
             lams = ", ".join(f"{each:g}" for each in self.lams)
             raise ValueError(f"policy {policy!r} at lam = {lam!r}: compared were {', '.join(self.policies)} at {lams}")
+        if column not in COLUMNS:
+            raise ValueError(f"column {column!r} is unknown: {suggest(column, COLUMNS)}")
         return np.array([row[column] for row in self._rows_of[policy, lam]])
 
     def summary(self, policy: str, lam: float) -> dict[str, Summary]:
@@ -88,6 +92,7 @@ class Evaluation:
         """Paired difference policy - reference over the common episodes."""
         return Summary.of(self.values(policy, lam, column) - self.values(reference, lam, column))
 
+    @checked
     def ranked(self, lam: float) -> list[str]:
         """Policies, the best mean return first."""
         return sorted(self.policies, key=lambda policy: -self.values(policy, lam, "return").mean())
@@ -104,6 +109,7 @@ class Evaluation:
         ]
         return f"{stem}{min(member_numbers)}..{max(member_numbers)}"
 
+    @checked
     def best_of(self, stem: str, lam: float) -> str:
         """The member of a numbered family with the best mean return: the best in hindsight.
 
@@ -117,6 +123,7 @@ class Evaluation:
             raise ValueError(f"lam = {lam:g}: must be one of {', '.join(f'{each:g}' for each in self.lams)}")
         return max(members, key=lambda policy: self.values(policy, lam, "return").mean())
 
+    @checked
     def save(self, out: str | Path) -> None:
         """Write evaluation.csv and evaluation.json into a folder, each whole or not at all."""
         out = Path(out)
@@ -154,6 +161,7 @@ def stem_of(policy: str) -> str:
     return policy.rstrip("0123456789")
 
 
+@checked_but("policies", "lams", "episodes", "seed", "threads")
 def evaluate(  # noqa: PLR0913
     policies: str | Sequence[str] | dict[str, Policy],
     scenario: Scenario | str,

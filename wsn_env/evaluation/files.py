@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryFile
 
 LOCK_FILE = ".wsn.lock"
 
@@ -27,10 +28,22 @@ def replacing(path: str | Path) -> Iterator[Path]:
     _remove_temporary_files_of_dead_processes(path)
     temporary = path.with_name(f".{os.getpid()}.{path.name}")
     try:
-        yield temporary
-        os.replace(temporary, path)
+        with naming(path, temporary):
+            yield temporary
+            os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def naming(path: str | Path, temporary: Path | None = None) -> Iterator[None]:
+    """What goes wrong with a file names it: a full disk does not. The temporary name is no user's."""
+    try:
+        yield
+    except OSError as problem:
+        if problem.errno is None or problem.filename not in (None, temporary, str(temporary)):
+            raise
+        raise OSError(problem.errno, problem.strerror, str(path)) from None
 
 
 def check_replaceable(path: str | Path) -> None:
@@ -46,6 +59,22 @@ def check_replaceable(path: str | Path) -> None:
         raise ValueError(f"{path}: is a folder: must be a regular file, or not exist yet")
     if path.exists() and not path.is_file():
         raise ValueError(f"{path}: is a device or a pipe: must be a regular file, or not exist yet")
+
+
+def check_writable(path: str | Path) -> None:
+    """Make the folder of a file to be, and see that the file can be written there, before time is spent.
+
+    Raises:
+        ValueError: it cannot, or something is there that must not be replaced.
+    """
+    path = Path(path)
+    check_replaceable(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=path.parent):
+            pass
+    except OSError as problem:
+        raise _not_writable(path.parent, problem) from None
 
 
 @contextmanager
@@ -101,8 +130,12 @@ def _lock(path: Path) -> int:
         try:
             _try_to_lock(file)
             if _same_file(file, path):
-                os.ftruncate(file, 0)
-                os.write(file, str(os.getpid()).encode())
+                try:
+                    os.ftruncate(file, 0)
+                    os.write(file, str(os.getpid()).encode())
+                except OSError as problem:
+                    path.unlink()
+                    raise _not_writable(path.parent, problem) from None
                 return file
         except BlockingIOError:
             process = os.read(file, 20).decode(errors="replace").strip()

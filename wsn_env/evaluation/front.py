@@ -25,6 +25,8 @@ from wsn_env.evaluation.comparison import Evaluation, stem_of
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.intervals import RESAMPLES, Summary
 from wsn_env.evaluation.versions import versions
+from wsn_env.models.arguments import checked, checked_but
+from wsn_env.models.quantity import whole_number
 from wsn_env.scenario import Scenario
 
 OTHERS = "all others together"
@@ -62,16 +64,19 @@ class Volume:
     difference: Summary | None
 
 
+@checked_but("number")
 def lam_sweep(scenario: Scenario, number: int = 9) -> tuple[float, ...]:
     """Trade-offs, evenly spaced in their logarithm, over the scenario's span [m/mJ]: 0.3 to 30 for PreDC-v0.
 
     A scenario that draws lam from a pair is swept from the one to the other.
     """
+    number = whole_number("number", number, 1)
     low, high = scenario.lam_range
     low, high = (low, high) if low < high else scenario.lam_span
     return tuple(float(f"{lam:.2g}") for lam in np.geomspace(low, high, number))
 
 
+@checked
 def find_fronts(evaluation: Evaluation) -> Fronts:
     """Every policy's points in the order of the lams; a family's in the order of the numbers."""
     families: dict[tuple[str, bool], list[tuple[str, list[Point]]]] = {}
@@ -117,6 +122,7 @@ def reference_point(scenario: Scenario) -> tuple[float, float]:
     return scenario.reference_error_m, scenario.reference_energy_mj
 
 
+@checked
 def hypervolume(means: np.ndarray, reference: tuple[float, float]) -> float:
     """The area between points and the reference point that some point dominates.
 
@@ -129,6 +135,7 @@ def hypervolume(means: np.ndarray, reference: tuple[float, float]) -> float:
     return float(moocore.hypervolume(np.reshape(means, (-1, 2)), ref=reference))
 
 
+@checked
 def hypervolumes(fronts: Fronts, reference: tuple[float, float]) -> list[Volume]:
     """Of each front, and of the union of all but the first; with 95 % intervals and paired differences to the first.
 
@@ -159,6 +166,7 @@ def hypervolumes(fronts: Fronts, reference: tuple[float, float]) -> list[Volume]
     ]
 
 
+@checked
 def save_front(evaluation: Evaluation, fronts: Fronts, volumes: list[Volume], out: str | Path) -> None:
     """Write front.csv, a row a point, and front.json, the hypervolumes and what made them, into a folder."""
     import moocore

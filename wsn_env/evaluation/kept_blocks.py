@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from wsn_env.evaluation.files import check_replaceable, replacing
+from wsn_env.evaluation.files import check_replaceable, naming, replacing
 from wsn_env.evaluation.policies import Policy
 from wsn_env.evaluation.rollout import Block
 from wsn_env.evaluation.versions import sources_digest, versions
@@ -85,7 +85,7 @@ class KeptBlocks:
         if self._path is not None:
             note_modules()
             body = json.dumps([self._run, noted_files(self._modules), *block[:3], measured])
-            with open(self._path, "a", encoding="ascii") as file:
+            with naming(self._path), open(self._path, "a", encoding="ascii") as file:
                 file.write(f'["{_checksum(body.encode())}", {body}]\n')
 
 

@@ -12,6 +12,12 @@ if TYPE_CHECKING:
     from wsn_env.scenario import Scenario
 
 
+NATIVE = (
+    'the native vector environment, of gym.make_vec(..., vectorization_mode="vector_entry_point") or'
+    " ClusterVectorEnv(...)"
+)
+
+
 class NativeEnvs(Protocol):
     """What a ClusterVectorEnv has beyond Gymnasium's interface.
 
@@ -42,5 +48,12 @@ class NativeEnvs(Protocol):
 
 
 def unwrap_native(envs: VectorEnv) -> NativeEnvs:
-    """What wrappers stand around."""
-    return cast(NativeEnvs, envs.unwrapped)
+    """What wrappers stand around.
+
+    Raises:
+        ValueError: another environment.
+    """
+    native = envs.unwrapped
+    if not hasattr(type(native), "lam"):
+        raise ValueError(f"envs = {type(native).__name__}: must be {NATIVE}")
+    return cast(NativeEnvs, native)

@@ -13,8 +13,9 @@ from inspect import signature
 from pathlib import Path
 from typing import Any, Protocol
 
+from wsn_env.models.arguments import check_parameters, checked
 from wsn_env.models.own import class_in, own_error, own_place
-from wsn_env.models.quantity import is_line, parse_overrides, short, suggest
+from wsn_env.models.quantity import is_line, parse_overrides, plain, short, suggest
 from wsn_env.models.state import Cluster
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.view import View
@@ -34,6 +35,7 @@ def policy_names() -> list[str]:
     return sorted({point.name for point in entry_points(group=GROUP)})
 
 
+@checked
 def make_policy(name: str, scenario: Scenario | str, **parameters: Any) -> Policy:
     """A policy by name, one of your own from a file, or a learned one from the policy.json that train.py saved.
 
@@ -92,7 +94,7 @@ def named_policies(texts: str | Iterable[str] | Mapping[str, Policy], scenario: 
             if isinstance(policy, type) or not callable(getattr(policy, "act", None)):
                 raise ValueError(f"policies[{label!r}] = {short(repr(policy))}: must be a policy, with act(view)")
     else:
-        named = {}
+        named, texts = {}, plain(texts)
         if not isinstance(texts, str) and not isinstance(texts, Iterable):
             raise ValueError(f"policies: {_NO_NAME.format(type(texts).__name__)}")
         for text in dict.fromkeys([texts] if isinstance(texts, str) else texts):
@@ -136,15 +138,30 @@ def _parse_parameters(colon: str, text: str) -> dict:
 
 
 def _create_policy(name: str, maker, scenario: Scenario, parameters: dict) -> Policy:
+    wrong = None
+    kind = getattr(maker, "func", maker)  # of a partial
+    if getattr(kind, "__module__", "").startswith("wsn_env."):  # in files of one's own annotations may be anything
+        try:
+            parameters = check_parameters(kind, parameters)
+        except ValueError as problem:  # said where the class itself does not say more
+            wrong = ValueError(f"policy {name!r}: {problem}")
     try:
         policy = maker(scenario=scenario, **parameters)
-    except TypeError as problem:
-        told = f"cannot be made with a scenario and its parameters: {problem}{_suggest_parameter(maker, parameters)}"
-        raise ValueError(f"policy {name!r}: {own_place(problem)}{told}") from problem
     except Exception as problem:
-        if isinstance(problem, ValueError) or not own_place(problem):
+        if isinstance(problem, ValueError):
+            raise
+        if wrong:
+            raise wrong from None
+        if isinstance(problem, TypeError):
+            told = (
+                f"cannot be made with a scenario and its parameters: {problem}{_suggest_parameter(maker, parameters)}"
+            )
+            raise ValueError(f"policy {name!r}: {own_place(problem)}{told}") from problem
+        if not own_place(problem):
             raise
         raise ValueError(f"policy {name!r}: {own_error(problem)}") from problem
+    if wrong:
+        raise wrong
     if not callable(getattr(policy, "act", None)):
         raise ValueError(f"policy {name!r}: has no act(view)")
     return policy

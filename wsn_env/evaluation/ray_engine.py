@@ -89,23 +89,41 @@ def _play_blocks(ray: ModuleType, blocks: Sequence[Block]) -> Iterator[tuple[Blo
     waiting = list(reversed(blocks))
     running: dict[ObjectRef[Any], Block] = {}
     while waiting or running:
+        _check_cluster(ray)
         most = AHEAD * max(1, int(ray.cluster_resources().get("CPU", 1)))
         while waiting and len(running) < most:
             block = waiting.pop()
             running[task.remote(ray.cloudpickle.dumps(block))] = block
-        for done in ray.wait(list(running))[0]:
+        for done in ray.wait(list(running), timeout=PATIENCE_S)[0]:
             try:
                 measured, files = ray.get(done)
             except ray.exceptions.RayTaskError as problem:  # the policy's or the world's own error
                 raise problem.cause from None
             except ray.exceptions.RayError as problem:
-                raise ValueError(
-                    f"engine 'ray': the cluster is lost ({str(problem).partition(chr(10))[0]}); finished blocks are"
-                    " kept where there is a folder for them"
-                ) from None
+                raise _lost(str(problem).partition("\n")[0]) from None
             block = running.pop(done)
             add_noted(type(block.policy).__module__, files)
             yield block, measured
+
+
+def _check_cluster(ray: ModuleType) -> None:
+    """See that the cluster's head still answers: without it Ray ends this process after a minute, in words of its own.
+
+    Raises:
+        ValueError: it does not.
+    """
+    if ray.util.client.ray.is_connected():  # through a proxy, which tells by itself
+        return
+    host, _, port = ray.get_runtime_context().gcs_address.rpartition(":")
+    try:
+        socket.create_connection((host, int(port)), timeout=PATIENCE_S).close()
+    except OSError as problem:
+        raise _lost(f"its head does not answer: {problem.strerror or problem}") from None
+
+
+def _lost(why: str) -> ValueError:
+    kept = "finished blocks are kept where there is a folder for them, and the same command continues"
+    return ValueError(f"engine 'ray': the cluster is lost ({why}); {kept}")
 
 
 def software() -> dict[str, str]:

@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 
 from wsn_env.envs.vector_env import ClusterVectorEnv
-from wsn_env.evaluation.native_envs import unwrap_native
+from wsn_env.evaluation.native_envs import NATIVE, unwrap_native
 from wsn_env.evaluation.rollout import evaluation_seeds
 from wsn_env.models.quantity import short
 
@@ -30,10 +30,7 @@ def score(act: Callable[[Any], Any], envs: VectorEnv, seed: int = 0) -> np.ndarr
     """
     unwrapped = getattr(envs, "unwrapped", envs)
     if not isinstance(unwrapped, ClusterVectorEnv):
-        raise ValueError(
-            f"envs = {type(unwrapped).__name__}: must be the native vector environment, of"
-            ' gym.make_vec(..., vectorization_mode="vector_entry_point") or ClusterVectorEnv(...)'
-        )
+        raise ValueError(f"envs = {type(unwrapped).__name__}: must be {NATIVE}")
     if not callable(act):
         raise ValueError(f"act = {short(repr(act))}: must be a function of the observations of all rows")
     if unwrap_native(envs).scenario.ends_outside:

@@ -13,6 +13,7 @@ from gymnasium.vector.utils import batch_space
 from wsn_env.envs.interface import check_options
 from wsn_env.envs.vector_env import row_seeds
 from wsn_env.evaluation.native_envs import unwrap_native
+from wsn_env.models.arguments import checked
 
 
 class ConcatVectorEnv(gym.vector.VectorEnv):
@@ -22,7 +23,10 @@ class ConcatVectorEnv(gym.vector.VectorEnv):
         parts: ClusterVectorEnv, wrapped or not, of the same spaces and autoreset mode.
     """
 
+    @checked
     def __init__(self, parts: Sequence[gym.vector.VectorEnv]) -> None:
+        if not parts:
+            raise ValueError("parts = []: must hold at least one environment")
         first = parts[0]
         for part in parts:
             for name in ("single_observation_space", "single_action_space"):

@@ -9,6 +9,8 @@ import numpy as np
 
 from wsn_env.compiled.elementary import F, tanh32
 from wsn_env.compiled.kernels import kernel, piece
+from wsn_env.evaluation.files import replacing
+from wsn_env.models.arguments import checked
 
 
 @piece
@@ -88,13 +90,16 @@ class PolicyNetwork:
             if not np.isfinite(self.arrays[name]).all():
                 raise ValueError(f"network array {name} has weights that are not finite")
 
+    @checked
     def save(self, path: str | Path) -> None:
         """Write a safetensors file."""
         from safetensors.numpy import save
 
-        Path(path).write_bytes(save(self.arrays))
+        with replacing(path) as temporary:
+            temporary.write_bytes(save(self.arrays))
 
     @staticmethod
+    @checked
     def load(path: str | Path) -> FlatNetwork | EntryNetwork:
         """Read a safetensors file of either kind; nothing in it is executed.
 

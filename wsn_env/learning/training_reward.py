@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from wsn_env.evaluation.native_envs import unwrap_native
+from wsn_env.models.arguments import checked
 from wsn_env.scenario import Scenario
 
 WIDTHS = np.arange(-1.0, 4.5, 0.5)  # of beliefs, log2 of their rms over a scenario's typical error
@@ -28,6 +29,7 @@ class TrainingReward(gym.vector.VectorWrapper):
             whose infos are the next episodes' where one ends.
     """
 
+    @checked
     def __init__(self, envs: gym.vector.VectorEnv, scaled: bool = True, calibrated: bool = False) -> None:
         if unwrap_native(envs).interface.reward_space is not None:
             raise ValueError("reward 'vector': learners need one number, 'error' or 'belief'")

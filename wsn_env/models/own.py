@@ -7,6 +7,7 @@ there means the helper.py beside it if there is one, and means it for nobody els
 from __future__ import annotations
 
 import builtins
+import os
 import re
 import sys
 import traceback
@@ -184,7 +185,7 @@ def _is_own(file: str) -> bool:
         Path(sys.base_prefix),
     ]
     installed = {"site-packages", "dist-packages"} & set(path.parts)
-    return path.is_file() and not installed and not any(path.is_relative_to(other) for other in ours)
+    return os.path.isfile(path) and not installed and not any(path.is_relative_to(other) for other in ours)
 
 
 def kind_and_settings(registry: Registry, role: str, text: str) -> tuple[type[Kind], dict[str, Any]]:

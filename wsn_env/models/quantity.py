@@ -86,7 +86,8 @@ def whole_number(name: str, value: Any, least: int, most: int | None = None) -> 
     Raises:
         ValueError: unless it is a whole number in least..most; the message names the argument.
     """
-    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    value = plain(value)
+    whole = isinstance(value, int) and not isinstance(value, bool)
     if not whole or value < least or (most is not None and value > most):
         rule = f"a whole number, at least {least}" if most is None else f"in {least}..{most}, a whole number"
         raise ValueError(f"{name} = {short(repr(value))}: must be {rule}")
@@ -94,8 +95,9 @@ def whole_number(name: str, value: Any, least: int, most: int | None = None) -> 
 
 
 def plain(value: Any) -> Any:
-    """Python's own number for one of NumPy, in tuples and lists too; anything else as it is."""
-    if isinstance(value, np.generic):
+    """Python's own number for one of NumPy (an array of no dimension, too), in tuples and lists too; anything else as
+    it is."""
+    if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.ndim == 0):
         return value.item()
     return type(value)(map(plain, value)) if type(value) in (tuple, list) else value
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from importlib import import_module
 from pathlib import Path
 
@@ -27,8 +28,9 @@ def reproduce(name: str, out: str | Path, runs: int = 100, progress: Progress | 
     if name not in (*PAPERS, "all"):
         raise ValueError(f"paper {name!r} is unknown: {suggest(str(name), (*PAPERS, 'all'))}")
     runs = whole_number("runs", runs, 2)  # standard errors need two
-    for paper, module in PAPERS.items():
-        if name in (paper, "all"):
-            folder = Path(out) / paper if name == "all" else Path(out)
-            with alone_in(folder):
-                import_module(module).reproduce(folder, runs, progress)
+    folders = {paper: Path(out) / paper for paper in PAPERS} if name == "all" else {name: Path(out)}
+    with ExitStack() as held:
+        for folder in folders.values():  # all, before time is spent
+            held.enter_context(alone_in(folder))
+        for paper, folder in folders.items():
+            import_module(PAPERS[paper]).reproduce(folder, runs, progress)

@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from wsn_env.models.arguments import check_argument
+from wsn_env.models.quantity import short, whole_number
 from wsn_env.models.state import Cluster, Grid, Knowledge, Network, Reports, State
 from wsn_env.simulation import geometry
 
@@ -97,6 +99,8 @@ class View:
     @classmethod
     def of(cls, state: State) -> View:
         """The view of a state, with arrays of its own: it stays what it is when the state is stepped."""
+        if not isinstance(state, State):
+            check_argument("state", state, State)
         return cls(state.knowledge.copy().freeze())
 
     @property
@@ -172,6 +176,11 @@ class View:
         """The living nodes nearest to the prediction, or to a ring about it: (B, count) nodes, -1 for none, and their
         distances to the prediction [m]."""
         key = "nearest", count, ring_m
+        if type(count) is not int or type(ring_m) is not float or key not in self.derived:
+            count, ring_m = whole_number("count", count, 0), check_argument("ring_m", ring_m, float)
+            if not 0 <= ring_m < np.inf:
+                raise ValueError(f"ring_m = {ring_m}: must be a finite number, at least 0")
+            key = "nearest", count, ring_m
         if key not in self.derived:
             self.derived[key] = tuple(map(_frozen, geometry.nearest(self.network, self.prediction, count, ring_m)))
         return self.derived[key]
@@ -193,7 +202,7 @@ class View:
             "predicted_cov": self.predicted_cov.copy(),
             "positions": self.positions.copy(),
             "battery": self.battery.copy(),
-            "head": self.head.copy(),
+            "head": self.head[:, None].astype(np.int64),
             "member": self.member.astype(np.int8),
             "detected": self.detected.astype(np.int8),
             "measured": self.measured.copy(),
@@ -204,7 +213,19 @@ class View:
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, np.ndarray]) -> View:
-        """The view back from `as_arrays`; of one environment too, whose arrays lack the leading B."""
+        """The view back from `as_arrays`; of one environment too, whose arrays lack the leading B.
+
+        Raises:
+            ValueError: what it was given are no such arrays.
+        """
+        try:
+            return cls._from_arrays(arrays)
+        except (AttributeError, IndexError, KeyError, TypeError, ValueError) as problem:
+            words = "must be the arrays of the observation 'view', or of View.as_arrays"
+            raise ValueError(f"arrays: {words}: {short(repr(problem))}") from None
+
+    @classmethod
+    def _from_arrays(cls, arrays: dict[str, np.ndarray]) -> View:
         a = {name: np.asarray(value) for name, value in arrays.items()}
         if a["battery"].ndim == 1:
             a = {name: value[None] for name, value in a.items()}

@@ -11,7 +11,8 @@ from wsn_env.compiled import kernels
 from wsn_env.compiled.kernels import available_threads, over_rows, threads_for
 from wsn_env.filters import make_tracker
 from wsn_env.filters.particle import ParticleTracker
-from wsn_env.models.quantity import whole_number
+from wsn_env.models.arguments import check_argument, checked_but
+from wsn_env.models.quantity import short, whole_number
 from wsn_env.models.state import OUTCOME, Cluster, Grid, Outcome, State, Tracker
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import constants
@@ -23,6 +24,7 @@ LONG_LIST = 64
 class World:
     """A scenario brought to life. Holds no state of its own: every method is a function of its arguments."""
 
+    @checked_but("threads")
     def __init__(self, scenario: Scenario | str, threads: int | None = None, fast: bool = False) -> None:
         """Prepare a scenario.
 
@@ -47,11 +49,12 @@ class World:
         Args:
             keys: (B,) uint64, one a row: they fix field, track and every draw to come.
         """
-        keys = np.atleast_1d(np.asarray(keys, dtype=np.uint64))
+        keys = np.atleast_1d(_keys(keys))
         return self.restart(self.allocate(len(keys)), np.ones(len(keys), bool), keys, donate=True)[0]
 
     def allocate(self, rows: int) -> State:
         """Arrays for `restart` to begin episodes in."""
+        rows = whole_number("rows", rows, 0)
         s = self.scenario
         nodes = s.field.nodes
         lengths = dict(rows=rows, nodes=nodes, instants=s.periods + 1, particles=self.tracker.particles)
@@ -73,7 +76,8 @@ class World:
 
         Returns: the state, and an outcome that holds the search of `start="search"` and zeros else.
         """
-        rows, keys = np.asarray(rows, dtype=bool), np.asarray(keys, dtype=np.uint64)
+        _check_state(state)
+        rows, keys = np.asarray(rows, dtype=bool), _keys(keys)
         if not rows.shape == keys.shape == (state.rows,):
             raise ValueError(f"rows {rows.shape} and keys {keys.shape}: must both be ({state.rows},)")
         state = state if donate else state.copy()
@@ -104,6 +108,9 @@ class World:
 
         Returns: the state after the period, and what it brought and cost.
         """
+        _check_state(state)
+        if not isinstance(cluster, Cluster):
+            check_argument("cluster", cluster, Cluster)
         state = state if donate else state.copy()
         outcome = _nothing_yet(state)
         heads, members = _choice(cluster, state)
@@ -125,6 +132,7 @@ class World:
 
     def left(self, state: State) -> np.ndarray:
         """(B,) bool: the episode ends in this period, since the target is outside the field (`ends_outside`)."""
+        _check_state(state)
         if not self.scenario.ends_outside:
             return np.zeros(state.rows, bool)
         instant = np.minimum(state.period, self.scenario.periods)
@@ -141,6 +149,24 @@ class World:
 
     def _in_rows(self, rows, kernel, *arguments) -> None:
         over_rows(kernel, len(rows), threads_for(rows, self.threads), self._constants, rows, *arguments)
+
+
+def _check_state(state: State) -> None:
+    if not isinstance(state, State):
+        check_argument("state", state, State)
+
+
+def _keys(keys: npt.ArrayLike) -> np.ndarray:
+    """Keys as an array of uint64, of no dimension for one."""
+    if isinstance(keys, np.ndarray) and keys.dtype == np.uint64:
+        return keys
+    wanted = np.asarray(keys, dtype=object)
+    for key in wanted.flat:
+        try:
+            whole_number("keys", key, 0, 2**64 - 1)
+        except ValueError:
+            raise ValueError(f"keys = {short(repr(keys))}: must be whole numbers from 0 to 2^64 - 1") from None
+    return wanted.astype(np.uint64)
 
 
 def _nothing_yet(state: State) -> Outcome:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from wsn_env.compiled import draws
+from wsn_env.models.arguments import check_argument
 from wsn_env.models.motion.base import Motion
 from wsn_env.models.quantity import ScenarioError, quantity
 from wsn_env.models.recordings.tracks import read_track
@@ -43,6 +45,7 @@ class Recorded(RecordedMotion):
     span_m: float | None = quantity(80.0, "scale to this extent and centre; None: as recorded", above=0, optional=True)
 
     def __post_init__(self) -> None:
+        check_argument("Recorded.tracks", self.tracks, str | Path | Sequence[str | Path], ScenarioError)
         names = (self.tracks,) if isinstance(self.tracks, (str, Path)) else self.tracks
         object.__setattr__(self, "tracks", tuple(str(name) for name in names))
         if not self.tracks:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from wsn_env.models.arguments import check_argument
 from wsn_env.models.quantity import ScenarioError, check_quantity, suggest
 from wsn_env.models.recordings.files import DatasetError, parse_json, read_file
 from wsn_env.models.recordings.receivers import FARTHEST_M
@@ -72,6 +73,7 @@ def read_quantities(path: str | Path) -> dict[str, Any]:
     Raises:
         ScenarioError: names the file and what is wrong with it.
     """
+    check_argument("calibration", path, str | Path, ScenarioError)
     try:
         quantities = read_calibration(path)["quantities"]
     except CalibrationError as problem:

@@ -21,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wsn_env.models.arguments import checked
 from wsn_env.models.quantity import check_quantity
 from wsn_env.models.recordings.files import DatasetError, DatasetWarning, read_file
 from wsn_env.models.recordings.lines import FAULTS, read_packets
@@ -118,6 +119,7 @@ class Track:
         return levels[:periods], heard[:periods], positions[:periods]
 
 
+@checked
 def read_dataset(folder: str | Path) -> list[Track]:
     """All tracks of a folder, in the order of their files' names.
 
@@ -148,6 +150,7 @@ def track_files(folder: str | Path) -> list[Path]:
     return files
 
 
+@checked
 def read_track(path: str | Path, receivers: Receivers | None = None) -> Track:
     """A track, in the order of time, without the lines that cannot be used.
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from wsn_env.evaluation.files import check_replaceable, replacing
+from wsn_env.evaluation.files import check_writable, replacing
 from wsn_env.evaluation.policies import Policy
+from wsn_env.models.arguments import checked_but
 from wsn_env.models.quantity import ScenarioError, whole_number
 from wsn_env.reports.pages.page import build_page, fill_template, json_for_script, read_template
 from wsn_env.reports.pages.recording import Recording, record
@@ -14,6 +15,7 @@ from wsn_env.scenario import Scenario
 MOST = 2  # policies side by side
 
 
+@checked_but("seed")
 def replay(policies: dict[str, Policy], scenario: Scenario, seed: int, out: str | Path) -> Recording:
     """Play an episode and write its page.
 
@@ -30,11 +32,10 @@ def replay(policies: dict[str, Policy], scenario: Scenario, seed: int, out: str 
         raise ValueError(f"policies = {', '.join(policies) or 'none'}: must be one or two")
     if scenario.lam_range[0] != scenario.lam_range[1]:
         raise ScenarioError(f"Scenario.lam = {scenario.lam!r}: must be one number for a replay")
-    check_replaceable(out)
     seed = whole_number("seed", seed, 0)
+    check_writable(out)
     recording = record(policies, scenario, seed)
     page = build_page("replay", f"{scenario.name}, seed {seed}", player_html(recording))
-    Path(out).parent.mkdir(parents=True, exist_ok=True)
     with replacing(out) as path:
         path.write_text(page, encoding="utf-8")
     return recording

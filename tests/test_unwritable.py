@@ -1,0 +1,193 @@
+"""Folders that nobody may write into, disks that are full: one line, the old files intact; before time is spent."""
+
+import os
+import subprocess
+import sys
+from io import BytesIO, TextIOWrapper
+
+import pytest
+
+from wsn_env.bluetooth.synthetic import write_dataset
+from wsn_env.cli import main
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="limits and permissions of POSIX")
+
+SMALL = ["--set", "particles=30", "nodes=20", "side_m=40", "crossing_m=15", "periods=3"]
+BLE = ["--scenario", "Ble-v0", "--set", "particles=30", "--tracks", "DATA"]
+COMMANDS = {
+    "evaluate": ["evaluate", "--policies", "nearest0", "nearest1", "--episodes", "2", *SMALL, "--out", "OUT"],
+    "front": "evaluate --policies nearest0 nearest1 --pareto --lam 1 4 --episodes 2".split() + [*SMALL, "--out", "OUT"],
+    "recorded": ["evaluate", "--policies", "nearest0", "--episodes", "1", *BLE, "--out", "OUT"],
+    "replay": ["replay", "--policy", "nearest0", *SMALL, "--out", "OUT/page.html"],
+    "calibrate": ["calibrate", "--tracks", "DATA", "--maps", "--out", "OUT"],
+    "reproduce": ["reproduce", "underwater", "--runs", "2", "--out", "OUT"],
+}
+HARNESS = """
+import contextlib, io, os, resource, shutil, sys
+from pathlib import Path
+from matplotlib.figure import Figure
+from wsn_env.cli import main
+
+folder, arguments = Path(sys.argv[1]), sys.argv[2:]
+out = folder / "out"
+def draw(self, target, **more):
+    data = b"a picture" * 100
+    target.write(data) if hasattr(target, "write") else Path(target).write_bytes(data)
+if "evaluate" not in arguments:
+    Figure.savefig = draw
+def files():
+    return {str(path.relative_to(out)): path.read_bytes() for path in sorted(out.rglob("*")) if path.is_file()}
+def run():
+    return main([argument.replace("OUT", str(out)) for argument in arguments])
+def forked(prepare):
+    child = os.fork()
+    if child == 0:
+        said = io.StringIO()
+        prepare()
+        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
+            status = run()
+        os.write(pipe[1], said.getvalue().encode())
+        os._exit(status)
+    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    os.write(pipe[1], b"\\0")
+    said = b""
+    while not said.endswith(b"\\0"):
+        said += os.read(pipe[0], 10000)
+    return status, said[:-1].decode()
+
+assert run() == 0
+whole, pipe = files(), os.pipe()
+"""
+FULL = """
+older = (".md", ".html", ".png", ".csv")
+old = {name: b"old " + data if name.endswith(older) else data for name, data in whole.items()}
+sizes = sorted({len(data) for data in whole.values()})
+limits = [*sorted({20, *(size - 1 for size in sizes if size > 30)})]
+step = max(1, len(limits) // 5)
+for limit in limits[::step]:
+    for name, data in old.items():
+        (out / name).write_bytes(data)
+    status, said = forked(lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
+    assert status == 2, (limit, status, said)
+    assert said.startswith("wsn: ") and said.count("\\n") == 1 and "File too large" in said, (limit, said)
+    assert f"'{out}" in said, said
+    left = files()
+    assert not [name for name in left if Path(name).name.startswith(".")], left.keys()
+    assert all(left[name] in (old[name], whole[name]) for name in old)
+    assert forked(lambda: None)[0] == 0
+    assert files() == whole
+print("limits", len(limits[::step]))
+"""
+CLOSED = """
+import wsn_env.simulation.world as world
+import wsn_env.models.recordings.dataset as dataset
+def close():
+    if os.getuid() == 0:
+        os.setgroups([])
+        os.setgid(65534)
+        os.setuid(65534)
+    def play(*given, **more):
+        os._exit(9)
+    world.World.restart = dataset.read_dataset = play
+for path in (folder, *folder.parents):  # up to pytest's, which are for their owner alone
+    if path.stat().st_uid == os.getuid() and str(path).startswith(os.environ["PYTEST_ROOT"]):
+        path.chmod(0o755)
+for present in (True, False):
+    if not present:
+        shutil.rmtree(out)
+    for place in (folder, *([out, *(path for path in out.rglob("*") if path.is_dir())] if present else [])):
+        place.chmod(0o555)
+    status, said = forked(close)
+    for place in (folder, *([out, *(path for path in out.rglob("*") if path.is_dir())] if present else [])):
+        place.chmod(0o755)
+    assert status == 2, (present, status, said)
+    words = f"{out}: must be a folder that files can be written to: Permission denied"
+    assert said == f"wsn: {words}\\n", said
+    assert not present or files() == whole
+"""
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    return write_dataset(tmp_path_factory.mktemp("unwritable") / "data", tracks=2, seconds=15, seed=1)
+
+
+def play(program, name, data, folder):
+    command = [argument.replace("DATA", str(data)) for argument in COMMANDS[name]]
+    environment = os.environ | {"PYTEST_ROOT": str(folder.parents[1])}
+    ran = [sys.executable, "-c", HARNESS + program, str(folder), *command]
+    done = subprocess.run(ran, capture_output=True, text=True, timeout=1000, env=environment)
+    assert done.returncode == 0, done.stderr[-3000:]
+    return done.stdout
+
+
+def with_short(*short):
+    """All commands, the others than these in the long form of the tests."""
+    long = [pytest.mark.slow, pytest.mark.full]
+    return [pytest.param(name, marks=[] if name in short else long) for name in COMMANDS]
+
+
+@pytest.mark.parametrize("name", with_short("evaluate", "replay"))
+def test_a_full_disk_is_a_line_with_the_file_and_what_was_there_stays(name, data, tmp_path):
+    assert "limits" in play(FULL, name, data, tmp_path)
+
+
+@pytest.mark.parametrize("name", with_short("evaluate", "replay"))
+def test_a_folder_that_nobody_may_write_into_is_told_before_anything_is_played(name, data, tmp_path):
+    play(CLOSED, name, data, tmp_path)
+
+
+@pytest.fixture
+def nothing_is_played(monkeypatch):
+    def play(*given, **more):
+        raise AssertionError("played")
+
+    monkeypatch.setattr("wsn_env.simulation.world.World.restart", play)
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        (
+            "evaluate --scenario Binary-v0 --policies nearest0 ppo",
+            "policy 'ppo': none comes with the package for Binary-v0, only for Ble-v0, PreDC-v0, Rssi-v0",
+        ),
+        ("evaluate --policies nearest0 greedy:terms=3", "terms = 3: must be a list of list of number or None"),
+        ("evaluate --policies nearest0 adaptive:order=best", "order 'best' is unknown: did you mean nearest?"),
+        ("evaluate --policies nearest0 nowhere/policy.json", "policy 'nowhere/policy.json' does not exist"),
+        (
+            "evaluate --scenario Ble-v0 --tracks DATA --policies nearest0 p={track}/policy.json",
+            "policy 'walk_0/policy.json' does not exist",
+        ),
+        ("replay --policy nearest0 ppo --scenario Binary-v0", "policy 'ppo': none comes with the package"),
+        ("replay --policy nearest0 --out file/page.html", "file: must be a folder that files can be written to"),
+        ("replay --policy nearest0 --out .", "is a folder: must be a regular file, or not exist yet"),
+        ("reproduce all --out out", "out/grnn: must be a folder that files can be written to: File exists"),
+        ("reproduce pre_dc --out file", "file: must be a folder that files can be written to: File exists"),
+    ],
+)
+def test_what_cannot_end_well_is_told_before_anything_is_played(
+    command, said, data, tmp_path, monkeypatch, capsys, nothing_is_played
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").write_text("")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "grnn").write_text("")
+    assert main([part.replace("DATA", str(data)) for part in command.split()]) == 2
+    line = capsys.readouterr().err
+    assert line.startswith("wsn: ") and said in line and line.count("\n") == 1
+    assert {path.name for path in tmp_path.iterdir()} == {"file", "out"}
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["grnn"]
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_a_terminal_without_a_letter_loses_nothing(encoding, data, tmp_path, monkeypatch):
+    terminal = TextIOWrapper(BytesIO(), encoding)
+    monkeypatch.setattr("sys.stdout", terminal)
+    monkeypatch.setattr("wsn_env.reports.pictures.can_draw", lambda: False)
+    command = [part.replace("DATA", str(data)).replace("OUT", str(tmp_path)) for part in COMMANDS["recorded"]]
+    assert main(command) == 0
+    terminal.flush()
+    shown = terminal.buffer.getvalue().decode(encoding)
+    assert "nearest0" in shown and "written: " in shown
+    assert {"tracks.csv", "tracks.json", "tracks.md"} <= {path.name for path in tmp_path.iterdir()}
