@@ -201,6 +201,44 @@ def test_another_layout_of_a_record_compiles_what_reads_it(folder):
     assert run(folder, "layout.py")[0] == ["2.0", "1"]
 
 
+OF_TWO_KINDS = """
+import sys
+import numpy as np
+from wsn_env.compiled import store
+from wsn_env.compiled.kernels import kernel, piece
+
+@piece  # long enough to be called, not copied into its callers
+def long(cs, x):
+    total = 0.0
+    for i in range(40):
+        for _ in range(3):
+            x = x * 1.01 + np.sqrt(abs(x - 1.5)) - (x if x > i else cs.first)
+            for k in range(3):
+                total += np.sqrt(x * x + k) / (1.0 + abs(x)) + cs.first
+                if total > 1e6:
+                    total -= np.sqrt(total)
+    return total
+
+@kernel
+def play(cs, x):
+    return long(cs, x) + long(cs, x + 1.0) + long(cs, x * 2.0) + long(cs, x - 3.0)
+
+for order in sys.argv[1:]:
+    constants = np.zeros((), [(name, float) for name in order.split(",")])
+    constants["first"], constants["second"] = 1.0, 100.0
+    print(play(constants[()], 2.0))
+print(len(store.compiled))
+"""
+
+
+def test_kernels_of_two_processes_do_not_call_each_others_functions(folder):
+    """Both are loaded by a third; Numba would give the same names to what they are made of."""
+    orders = "first,second", "second,first"
+    found = [run(folder, "-c", OF_TWO_KINDS, order)[0] for order in orders]
+    assert found[0] == found[1] and found[0][1] == "1"
+    assert run(folder, "-c", OF_TWO_KINDS, *orders)[0] == [found[0][0]] * 2 + ["0"]
+
+
 PLAY = """
 import gymnasium as gym, wsn_env
 for name in ("PreDC-v0", "Binary-v0", "Underwater-v0", "Ble-v0"):

@@ -15,6 +15,7 @@ import gc
 import hashlib
 import inspect
 import os
+import secrets
 import shutil
 import sys
 import tempfile
@@ -22,6 +23,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
+from itertools import count
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -29,6 +31,7 @@ from typing import Any
 import numba
 import numpy as np
 from numba.core import event
+from numba.core.bytecode import FunctionIdentity
 from numba.core.errors import NumbaError
 
 from wsn_env.compiled.stamp import options_text, stamp
@@ -38,6 +41,8 @@ SOURCE, SUMS = "kernel.py", "sums.txt"
 THE_SAME_TIME = 1_000_000_000  # s: Numba compares when a source file was changed
 
 NOT_KEPT = "compiled kernels cannot be kept in {} ({}); set NUMBA_CACHE_DIR to a folder that can be written to"
+
+NAMING = "random"  # of what kernels are made of: see _name_apart
 
 compiled: list[str] = []  # names of the kernels compiled (not loaded) in this process
 _opened: dict[object, str] = {}  # kernels by Numba's dispatcher
@@ -89,8 +94,9 @@ def open_kernel(
         kinds: the type of the constants that it is made for, where it takes any.
     """
     with _lock:
+        _name_apart()
         name = f"{function.__module__}.{function.__qualname__}"
-        more = options_text(options) + ("" if kinds is None else repr(kinds))
+        more = NAMING + options_text(options) + ("" if kinds is None else repr(kinds))
         folder = store_folder() / f"{name}-{stamp(function, more=more)}"
         try:
             _prepare(folder, function)
@@ -132,6 +138,16 @@ def _open_kept(
         _folders.append(folder)
         _sign(folder, anew=len(compiled) > before)
     return dispatcher, result
+
+
+def _name_apart() -> None:
+    """Let what is compiled next have names that no other process gives.
+
+    Numba names functions by module, name, types and a number that each process counts from 1, and types of records by
+    a number of the process, too. Two kernels that were compiled by two processes would share names for different code,
+    and in a third, which loads both, the second would call the functions of the first.
+    """
+    FunctionIdentity._unique_ids = count(secrets.randbits(62))
 
 
 @contextmanager
