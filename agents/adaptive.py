@@ -56,7 +56,7 @@ class Adaptive(ViewPolicy):
         table = np.array(self.switches)
         _, few, many, spread_m, hysteresis_m = table[nearest_lam(table[:, 0], view.lam)].T
         sizes = np.where(view.spread_m > spread_m, many, few).astype(int)
-        most = max(Switch(*each).many for each in self.switches or ())
+        most = int(table[:, Switch._fields.index("many")].max())
         return surround(view, self.scenario, self.order, hysteresis_m, sizes, most)
 
 
