@@ -56,7 +56,8 @@ class Adaptive(ViewPolicy):
         table = np.array(self.switches)
         _, few, many, spread_m, hysteresis_m = table[nearest_lam(table[:, 0], view.lam)].T
         sizes = np.where(view.spread_m > spread_m, many, few).astype(int)
-        return surround(view, self.scenario, self.order, hysteresis_m, sizes, most=int(table[:, 2].max()))
+        most = int(table[:, Switch._fields.index("many")].max())
+        return surround(view, self.scenario, self.order, hysteresis_m, sizes, most)
 
 
 def check_switches(switches: Sequence[Switch]) -> None:

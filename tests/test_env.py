@@ -199,7 +199,7 @@ def test_menu_keeps_moves_and_counts():
     order = np.argsort(np.hypot(*(view["positions"] - view["predicted_mean"][::2]).T))
     others = [node for node in order if node != view["head"]][:2]
     view, *_ = env.step(1 + 2)
-    assert view["head"] == before["head"] and set(np.flatnonzero(view["member"])) == {before["head"], *others}
+    assert view["head"] == before["head"] and set(np.flatnonzero(view["member"])) == {before["head"].item(), *others}
 
 
 def test_dead_choices_are_masked_dropped_and_counted():
@@ -229,7 +229,7 @@ def test_a_radius_names_who_is_within_it():
         distance = np.hypot(*(observation["positions"] - observation["predicted_mean"][::2]).T)
         within = set(np.flatnonzero(distance <= radius * 2 * env.scenario.radius_m)) & set(np.argsort(distance)[:12])
         observation, *_ = env.step(np.array([radius], np.float32))
-        assert set(np.flatnonzero(observation["member"])) == within | {observation["head"]}
+        assert set(np.flatnonzero(observation["member"])) == within | {observation["head"].item()}
     with pytest.raises(AttributeError, match="no masks"):
         env.action_masks()
 
