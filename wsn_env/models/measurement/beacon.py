@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 MOST_PACKETS = 10_000_000  # of an episode: each receiver's are drawn when it begins
 MAP_LEAVES = 0.15  # of the static field's variance, where a map was made on other days
 
-OF_RECEIVERS: dict[str, dict[str, float]] = {  # what may be each one's own
+OF_RECEIVERS: dict[str, dict[str, Any]] = {  # what may be each one's own
     "at_1m_db": dict(at_least=-1e6, at_most=1e6),
     "exponents": dict(at_least=0, at_most=1000),
     "heights_m": dict(at_least=-1000, at_most=1000),
