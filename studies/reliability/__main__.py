@@ -1,4 +1,4 @@
-"""What docs/reliability.md says: trials of damaged files and long runs, and every message about bad input.
+"""What docs/reliability.md says: trials of damaged files, kills and long runs, and every message about bad input.
 
     python -m studies.reliability --out out/reliability
 
@@ -16,6 +16,7 @@ from tempfile import TemporaryDirectory
 import tyro
 
 from studies.reliability.hostile_files import try_files
+from studies.reliability.kills import COMMANDS, kill
 from studies.reliability.memory import RUNS, growth
 from studies.reliability.messages import messages as all_messages
 from wsn_env.evaluation.files import replacing
@@ -23,6 +24,7 @@ from wsn_env.evaluation.progress import Progress, progress_bar
 from wsn_env.reports.markdown import markdown_table
 
 EACH = 2000  # damaged files of a kind
+KILLS = 12  # of a command
 FLAT = 1.01  # memory at the end over that after a tenth
 
 
@@ -52,6 +54,18 @@ def files(asked: Reliability, report: Progress) -> tuple[str, list[str]]:
     return markdown_table(["file", "read", "refused in one line", "anything else"], rows), failures
 
 
+def kills(asked: Reliability, report: Progress) -> tuple[str, list[str]]:
+    """Commands killed by turns at a file and at a time, and run again."""
+    rows, failures, each = [], [], max(1, round(KILLS * asked.share))
+    for number, (name, command) in enumerate(COMMANDS.items()):
+        report(number, len(COMMANDS), name)
+        with TemporaryDirectory() as folder:
+            found = kill(name, Path(folder), "--random", str(each))
+        rows.append([f"`{command}`", str(each), str(found["killed"]), str(len(found["differ"]))])
+        failures += [f"{name}, {one}" for one in found["differ"]]
+    return markdown_table(["command", "kills", "before its end", "files that differ"], rows), failures
+
+
 def memory(asked: Reliability, report: Progress) -> tuple[str, list[str]]:
     """Long runs."""
     rows, failures = [], []
@@ -73,6 +87,7 @@ def messages(asked: Reliability, report: Progress) -> tuple[str, list[str]]:
 TRIALS: dict[str, Callable[[Reliability, Progress], tuple[str, list[str]]]] = {
     "messages": messages,
     "files": files,
+    "kills": kills,
     "memory": memory,
 }
 
