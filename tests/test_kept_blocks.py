@@ -353,17 +353,6 @@ def test_temporary_files_of_killed_processes_go_and_others_stay(tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == stay | {"a.csv", f".{dead.pid}1.a.csv"}
 
 
-def test_results_are_saved_before_tables_are_printed(tmp_path, monkeypatch, capsys):
-    import wsn_env.reports.tables as module
-
-    def fail(*given):
-        raise BrokenPipeError(32, "Broken pipe")
-
-    monkeypatch.setattr(module, "print_tables", fail)
-    assert main(["evaluate", "--policies", "nearest0", "--episodes", "2", "--out", str(tmp_path), *SMALL]) == 2
-    assert {"evaluation.csv", "evaluation.json", "evaluation.md"} <= {path.name for path in tmp_path.iterdir()}
-
-
 @pytest.mark.parametrize("label", ["[/b]", "[red]", "[/x][link]", "[", "]"])
 def test_labels_are_shown_as_they_are(label, tmp_path, capsys):
     policies = [f"{label}=nearest0", "nearest1"]
