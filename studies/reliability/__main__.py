@@ -1,4 +1,5 @@
-"""What docs/reliability.md says: trials of damaged files, kills and long runs, and every message about bad input.
+"""What docs/reliability.md says: trials of damaged files, kills, random environments and long runs, and every message
+about bad input.
 
     python -m studies.reliability --out out/reliability
 
@@ -19,12 +20,15 @@ from studies.reliability.hostile_files import try_files
 from studies.reliability.kills import COMMANDS, kill
 from studies.reliability.memory import RUNS, growth
 from studies.reliability.messages import messages as all_messages
+from tests import fuzz
+from wsn_env.envs.registration import IDS
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.progress import Progress, progress_bar
 from wsn_env.reports.markdown import markdown_table
 
 EACH = 2000  # damaged files of a kind
 KILLS = 12  # of a command
+WORLDS = 3000
 FLAT = 1.01  # memory at the end over that after a tenth
 
 
@@ -79,6 +83,23 @@ def memory(asked: Reliability, report: Progress) -> tuple[str, list[str]]:
     return markdown_table(["run", "MiB after a tenth", "MiB at the end", "growth"], rows), failures
 
 
+def worlds(asked: Reliability, report: Progress) -> tuple[str, list[str]]:
+    """Random environments, by `tests/fuzz.py`."""
+    rows, failures, most = {name: [0, 0, 0, 0] for name in IDS}, [], max(1, round(WORLDS * asked.share))
+    first = most * asked.seed
+    for number in range(first, first + most):
+        case = fuzz.case_of(number, usual=True)
+        periods, law = fuzz.broken_law(case)
+        found = [periods > 0, not periods and not law, periods, bool(law)]
+        rows[case.id] = [old + new for old, new in zip(rows[case.id], found, strict=True)]
+        failures += [f"{case}: {law}"] if law else []
+        report(number - first + 1, most, case.id)
+    shown = [[name, *(f"{count:,}" for count in counts)] for name, counts in rows.items()]
+    shown.append(["all", *(f"{sum(counts):,}" for counts in zip(*rows.values(), strict=True))])
+    columns = ["preset", "environments made", "refused when made", "periods", "laws broken"]
+    return markdown_table(columns, shown), failures
+
+
 def messages(asked: Reliability, report: Progress) -> tuple[str, list[str]]:
     """Bad input."""
     return all_messages(), []
@@ -88,6 +109,7 @@ TRIALS: dict[str, Callable[[Reliability, Progress], tuple[str, list[str]]]] = {
     "messages": messages,
     "files": files,
     "kills": kills,
+    "worlds": worlds,
     "memory": memory,
 }
 
