@@ -165,7 +165,7 @@ def test_sensible_policies_stay_within_the_reference_point(name):
 
 @pytest.mark.parametrize("field", ["reference_error_m", "reference_energy_mj"])
 def test_a_reference_point_is_above_zero(field):
-    with pytest.raises(ScenarioError, match=f"Scenario.{field} = 0: must be a finite number above 0"):
+    with pytest.raises(ScenarioError, match=f"Scenario.{field} = 0: must be a finite number at least 1e-09"):
         Scenario.named("PreDC-v0", **{field: 0})
 
 

@@ -26,8 +26,8 @@ from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.progress import Progress, progress_bar
 from wsn_env.reports.markdown import markdown_table
 
-EACH = 2000  # damaged files of a kind
-KILLS = 12  # of a command
+EACH = 300  # damaged files of a kind
+KILLS = 16  # of a command
 WORLDS = 3000
 FLAT = 1.01  # memory at the end over that after a tenth
 

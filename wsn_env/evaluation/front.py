@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.util import find_spec
@@ -123,7 +123,7 @@ def reference_point(scenario: Scenario) -> tuple[float, float]:
 
 
 @checked
-def hypervolume(means: np.ndarray, reference: tuple[float, float]) -> float:
+def hypervolume(means: Sequence[np.ndarray] | np.ndarray, reference: tuple[float, float]) -> float:
     """The area between points and the reference point that some point dominates.
 
     Args:
