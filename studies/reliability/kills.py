@@ -110,7 +110,7 @@ def _draw_small(blank: bool) -> None:
     save = Figure.savefig
 
     def draw(self: Figure, target: Any, **more: Any) -> None:
-        if blank:
+        if blank and isinstance(target, (str, Path)):
             Path(target).write_bytes(b"a picture")
         else:
             save(self, target, **more | {"dpi": 20})
