@@ -27,7 +27,7 @@ from wsn_env.evaluation.progress import Progress, progress_bar
 from wsn_env.reports.markdown import markdown_table
 
 EACH = 300  # damaged files of a kind
-KILLS = 16  # of a command
+KILLS = 12  # of a command
 WORLDS = 3000
 FLAT = 1.01  # memory at the end over that after a tenth
 
