@@ -28,7 +28,13 @@ def test_the_bootstrap_finds_the_error_of_a_mean():
 
 @pytest.mark.parametrize(
     ("value", "stderr", "text"),
-    [(1.2345, 0.0412, "1.234 (0.041)"), (123.4, 27, "123 (27)"), (2, 0, "2"), (2.5, float("nan"), "2.5")],
+    [
+        (1.2345, 0.0412, "1.234 (0.041)"),
+        (123.4, 27, "123 (27)"),
+        (2, 0, "2"),
+        (2, 1e-16, "2"),
+        (2.5, float("nan"), "2.5"),
+    ],
 )
 def test_its_text_shows_two_digits_of_the_error(value, stderr, text):
     assert str(Measured(value, stderr)) == text

@@ -129,7 +129,7 @@ def test_a_battery_lasts_as_long_as_its_docstring_says():
 @pytest.mark.parametrize(
     ("overrides", "says"),
     [
-        (dict(radio="modem", hop_m=0), "Modem.hop_m = 0: must be a finite number above 0"),
+        (dict(radio="modem", hop_m=0), "Modem.hop_m = 0: must be a finite number at least 0.001"),
         (dict(radio="modem", bit_rate=0), "Modem.bit_rate = 0"),
         (dict(radio="modem", tx_nj_per_bit=3), "no quantity 'tx_nj_per_bit'"),
         (dict(radio="modem", receiver="sink"), "Modem.receiver = 'sink': allowed are head"),

@@ -118,7 +118,7 @@ class Kinds:
         calibration.save(self._calibration)
         save_map(residual_map(tracks, calibration), self._map)
         self._csv = folder / "walk.csv"
-        self._csv.write_text("t,x,y\n" + "".join(f"{k},{10 + k},{20 + k / 2}\n" for k in range(20)))
+        self._csv.write_text("t,x,y\n" + "".join(f"{k},{10 + k},{20 + k / 2}\n" for k in range(20)), encoding="utf-8")
         self._policy = folder / "policy"
         shutil.copytree(PRETRAINED / "PreDC-v0", self._policy)
         self._run = folder / "run"
@@ -126,7 +126,7 @@ class Kinds:
         write_checkpoint(self._run / "checkpoint.safetensors", {"a": np.arange(9.0)}, {"quantity": {"nodes": 40}})
         progress = progress_file(self._run)
         progress.parent.mkdir()
-        progress.write_text("time/total_timesteps,a\n" + "".join(f"{k},{k / 3}\n" for k in range(20)))
+        progress.write_text("time/total_timesteps,a\n" + "".join(f"{k},{k / 3}\n" for k in range(20)), encoding="utf-8")
         self._kept = folder / "kept"
         self._rows = evaluate(["nearest0"], SMALL, episodes=EPISODES).rows
         _stop_in_midst(self._kept)

@@ -94,14 +94,14 @@ def _forked(command: list[str], out: Path, last: int = 0, seconds: float | None 
 
         sys.addaudithook(watch)
         status = _run(command)
-        out.with_suffix(".count").write_text(str(count))
+        out.with_suffix(".count").write_text(str(count), encoding="utf-8")
         os._exit(status)
     if seconds is not None:
         time.sleep(seconds)
         os.kill(child, signal.SIGKILL)
     status = os.waitpid(child, 0)[1]
     counted = out.with_suffix(".count")
-    return status, int(counted.read_text()) if counted.exists() else 0
+    return status, int(counted.read_text(encoding="utf-8")) if counted.exists() else 0
 
 
 def _draw_small(blank: bool) -> None:

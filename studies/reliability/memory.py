@@ -54,7 +54,7 @@ def growth(name: str, steps: int) -> tuple[float, float]:
 
 def peak_mib() -> float:
     """Of this process until now; Linux alone tells it without what the process was before."""
-    (kib,) = re.findall(r"VmHWM:\s+(\d+) kB", Path("/proc/self/status").read_text())
+    (kib,) = re.findall(r"VmHWM:\s+(\d+) kB", Path("/proc/self/status").read_text(encoding="utf-8"))
     return int(kib) / 2**10
 
 

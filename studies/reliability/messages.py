@@ -184,12 +184,12 @@ def write_files(folder: Path) -> None:
     write_dataset(folder / "walks", tracks=2, seconds=15)
     for name, of_time in (("milliseconds", lambda s: f"{1e3 * s:.0f}"), ("stamps", lambda s: f"2026-01-01T{s:.0f}")):
         for path in write_dataset(folder / name, tracks=2, seconds=15).glob("*.mbd"):
-            lines = [line.partition(",") for line in path.read_text().splitlines()]
-            path.write_text("".join(f"{of_time(float(time))},{rest}\n" for time, _, rest in lines))
+            lines = [line.partition(",") for line in path.read_text(encoding="utf-8").splitlines()]
+            path.write_text("".join(f"{of_time(float(time))},{rest}\n" for time, _, rest in lines), encoding="utf-8")
     for name in ("begun", "lost"):
         (folder / "runs" / name).mkdir(parents=True)
-        (folder / "runs" / name / "policy.json").write_text("{}")
-    (folder / "runs" / "begun" / "config.json").write_text(json.dumps({}))
+        (folder / "runs" / name / "policy.json").write_text("{}", encoding="utf-8")
+    (folder / "runs" / "begun" / "config.json").write_text(json.dumps({}), encoding="utf-8")
 
 
 def messages() -> str:

@@ -197,7 +197,7 @@ class ViewObservation:
     """Everything a network could know, as float64: enough for every hand-written policy (`View.from_arrays`)."""
 
     def __init__(self, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> None:
-        nodes, side, far = scenario.field.nodes, max(scenario.field.room_m), np.inf  # beliefs grow without end
+        nodes, side, far = scenario.field.nodes, max(scenario.field.room_m), 1e300  # beliefs may grow without end
 
         def box(low, high, *shape):
             return spaces.Box(low, high, shape, np.float64)

@@ -93,7 +93,7 @@ class Measured(NamedTuple):
         return Measured(root, self.stderr / (2 * root))
 
     def __str__(self) -> str:
-        if not self.stderr or not isfinite(self.stderr):
+        if not isfinite(self.stderr) or self.stderr <= 1e-12 * abs(self.value):  # rounding is no doubt
             return f"{self.value:.4g}"
         digits = max(0, 1 - floor(log10(self.stderr)))
         return f"{self.value:.{digits}f} ({self.stderr:.{digits}f})"
