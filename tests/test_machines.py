@@ -29,6 +29,8 @@ def play(folder, *before, without=(), after=COMMAND, **environment):
     return (done.returncode, done.stdout.decode(errors="replace"), done.stderr.decode(errors="replace")), files
 
 
+@pytest.mark.slow
+@pytest.mark.full  # its settings one by one: below
 def test_a_comparison_leaves_the_same_files_whatever_the_terminal(tmp_path):
     (status, _, said), files = play(tmp_path / "plain")
     assert status == 0, said
