@@ -23,12 +23,11 @@ class Boundary(ViewPolicy):
 
     width_m: float = 5.0
     sds: float = 1.0
+    sees_lam = False
 
     def __post_init__(self) -> None:
         check_quantity("Boundary", "width_m", self.width_m, at_least=0)
         check_quantity("Boundary", "sds", self.sds, at_least=0)
-
-    sees_lam = False
 
     def act(self, view: View) -> Cluster:
         """Wake the ring, for every row."""

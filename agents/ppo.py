@@ -59,7 +59,7 @@ class PPOPolicy(ViewPolicy):
                 f"policy 'ppo': none comes with the package for {self.scenario.name}, only for {shipped}: train one"
                 " with train.py and name its policy.json"
             )
-        said = read_saved(path, "interface")
+        said, digest = read_saved(path, "interface", DIGEST)
         try:
             settings = Settings(**said)
             if (settings.action, settings.observation) not in INTERFACES:
@@ -70,7 +70,7 @@ class PPOPolicy(ViewPolicy):
             raise ValueError(f"{path} is not a saved policy: {problem}") from None
         weights = path.with_suffix(".safetensors")
         network = PolicyNetwork.load(weights)
-        if read_saved(path, DIGEST) != file_digest(weights):
+        if digest != file_digest(weights):
             raise ValueError(f"{weights} is not the network that {path} was saved with: it is damaged, or another's")
         inputs, logits = interface.observation.space.shape[0], sum(_logit_counts(interface.action.space))
         if not network.fits(inputs, logits):

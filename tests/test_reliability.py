@@ -3,10 +3,13 @@
 import os
 import sys
 
+import numpy as np
 import pytest
 
 from studies.reliability import __main__ as reliability
+from studies.reliability import hostile_files
 from studies.reliability.kills import kill
+from studies.reliability.memory import peak_mib
 from studies.reliability.messages import messages
 from tests.figures import DOCS, found_blocks
 
@@ -33,6 +36,27 @@ def test_killed_at_some_files_the_same_command_ends_with_the_same_bytes(name, mo
     """Trainings: test_train.py."""
     found = kill(name, tmp_path, "--blank", "--files", *moments.split())
     assert found == {"killed": len(moments.split()), "differ": []}
+
+
+def test_a_reader_that_fails_is_told(monkeypatch, tmp_path, capsys):
+    def fail(path):
+        raise KeyError("inside")
+
+    monkeypatch.setattr(hostile_files, "_read_policy", fail)
+    assert reliability.main(["--only", "files", "--share", "0.001", "--out", str(tmp_path)]) == 1
+    assert "policy.json, file 0: KeyError('inside')" in capsys.readouterr().err
+
+
+def test_damage_is_damage():
+    content = b"".join(b"%d,1.5,abc\n" % k for k in range(40))
+    damaged = [hostile_files.damage(content, np.random.default_rng(k)) for k in range(100)]
+    assert sum(each != content for each in damaged) > 95 and len(set(damaged)) > 90
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_memory_that_was_held_is_seen():
+    before, held = peak_mib(), np.ones(2**23)
+    assert before + 50 < peak_mib() < before + held.nbytes / 2**20 + 50
 
 
 def test_an_unknown_trial_is_named(capsys):

@@ -271,6 +271,22 @@ def test_a_checkpoint_of_other_code_or_settings_is_refused(run, tmp_path, monkey
     assert resume(tmp_path, gamma=0.5).startswith(f"{path} was written with setting gamma = 0.95, and now it is 0.5")
 
 
+def test_a_checkpoint_knows_the_files_beside_an_own_sensor(tmp_path):
+    (tmp_path / "sharp.py").write_text(
+        "from dataclasses import dataclass\nfrom wsn_env.models.measurement.position import Position\nimport beside\n"
+        "@dataclass(frozen=True)\nclass Sharp(Position):\n    pass\n"
+    )
+
+    def files(number):
+        (tmp_path / "beside.py").write_text(f"NUMBER = {number}\n")
+        scenario = Scenario.named("PreDC-v0", measurement=f"{tmp_path / 'sharp.py'}:Sharp")
+        return run_folder.facts_of({"tracks": []}, scenario, Path(train.__file__))["file"]
+
+    first, again, edited = files(1), files(1), files(2)
+    assert first == again and first.keys() == edited.keys()
+    assert {Path(path).name for path in first if first[path] != edited[path]} == {"beside.py"}
+
+
 @pytest.mark.parametrize("content", [None, "", "[]", "null", "3", '{"steps": 4096', "[" * 10**5, b"\xff\xfe", "folder"])
 def test_a_run_without_its_settings_is_not_resumed(run, tmp_path, content):
     shutil.copytree(run, tmp_path / "short")

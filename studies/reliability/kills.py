@@ -133,7 +133,8 @@ def main(arguments: list[str] | None = None) -> None:
     def files(number: int) -> dict[str, bytes]:
         out = asked.folder / str(number)
         found = {str(path.relative_to(out)): path.read_bytes() for path in out.rglob("*") if path.is_file()}
-        return {path: found[path] for path in found if Path(path).name in DECISIVE.get(asked.name, Path(path).name)}
+        wanted = DECISIVE.get(asked.name)
+        return {path: data for path, data in found.items() if wanted is None or Path(path).name in wanted}
 
     if asked.name != "train":  # whose threads would be missing in a child
         assert _run(text.replace("OUT", str(asked.folder / "first")).split()) == 0  # imports, kernels

@@ -11,7 +11,6 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import gymnasium
-import numpy
 
 import wsn_env
 from wsn_env.bluetooth.synthetic import write_dataset
@@ -159,9 +158,9 @@ def say(mistake: str) -> str:
             status = run(arguments[1:])
         lines = said.getvalue().strip().splitlines()
     else:
-        names = vars(gymnasium) | vars(numpy) | {name: getattr(wsn_env, name) for name in wsn_env.__all__}
+        names = {name: getattr(wsn_env, name) for name in wsn_env.__all__}
         try:
-            eval(mistake, names | {"gym": gymnasium, "np": numpy, "reset": reset})
+            eval(mistake, names | {"gym": gymnasium, "reset": reset})
             lines = []
         except (ValueError, gymnasium.error.Error) as problem:
             lines = f"{type(problem).__name__}: {problem}".splitlines()

@@ -102,16 +102,9 @@ class ClusterEnv(gym.Env):
             self._camera.show(self._state)
         return self._observe(), info
 
+    @one_thread
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """One period. Returns observation, reward, terminated, truncated, info."""
-        if not self._busy.acquire(False):  # as `one_thread`, for less
-            raise self._busy.refusal(self, "step")
-        try:
-            return self._step(action)
-        finally:
-            self._busy.release()
-
-    def _step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         if self._state is None:
             raise gym.error.ResetNeeded("call reset() before step()")
         if self._ended:

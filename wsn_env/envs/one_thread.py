@@ -21,14 +21,6 @@ class Busy:
     def __reduce__(self) -> tuple[Any, ...]:
         return Busy, ()
 
-    @staticmethod
-    def refusal(environment: object, method: str) -> RuntimeError:
-        """What a second thread is told."""
-        return RuntimeError(
-            f"{type(environment).__name__}.{method}: the environment is being stepped by another thread: give each"
-            " thread an environment of its own, or let them take turns"
-        )
-
 
 class HasBusy(Protocol):
     """An environment."""
@@ -46,7 +38,10 @@ def one_thread(method: Callable[Concatenate[E, P], R]) -> Callable[Concatenate[E
     def guarded(self: E, /, *args: P.args, **kwargs: P.kwargs) -> R:
         busy = self._busy
         if not busy.acquire(False):
-            raise busy.refusal(self, method.__name__)
+            raise RuntimeError(
+                f"{type(self).__name__}.{method.__name__}: the environment is being stepped by another thread: give"
+                " each thread an environment of its own, or let them take turns"
+            )
         try:
             return method(self, *args, **kwargs)
         finally:

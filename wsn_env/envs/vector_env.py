@@ -140,16 +140,9 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             self._camera.begin(self._state, outcome, rows)
         return info
 
+    @one_thread
     def step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """One period for every row; ended rows start anew as the autoreset mode says."""
-        if not self._busy.acquire(False):  # as `one_thread`, for less
-            raise self._busy.refusal(self, "step")
-        try:
-            return self._step(actions)
-        finally:
-            self._busy.release()
-
-    def _step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         if self._state is None:
             raise gym.error.ResetNeeded("call reset() before step()")
         anew = self._ended

@@ -18,7 +18,7 @@ from wsn_env.evaluation.files import check_replaceable, naming, replacing
 from wsn_env.evaluation.policies import Policy
 from wsn_env.evaluation.rollout import Block
 from wsn_env.evaluation.versions import sources_digest, versions
-from wsn_env.models.own_files import file_digest, note_modules, noted_files, watch
+from wsn_env.models.own_files import file_digest, note_modules, noted_files, sources_of, watch
 from wsn_env.models.recordings.receivers import DEVICES, PARAMETERS
 from wsn_env.scenario import Scenario
 
@@ -112,7 +112,7 @@ def _digest(settings: dict[str, Any], policies: Sequence[Policy], modules: Seque
     named = sorted(set(_strings([settings["scenario"], [_values(policy) for policy in policies]])))
     files = [*named, *_beside(settings["scenario"])]
     contents = [file_digest(file) for file in files]
-    sources = [(file, file_digest(file)) for name in modules for file in _sources(name)]
+    sources = [(file, file_digest(file)) for name in modules for file in sources_of(name)]
     inputs = [settings, versions(), sources_digest(), described, files, contents, modules, sources]
     return _checksum(json.dumps(inputs, sort_keys=True, default=_plain).encode())
 
@@ -165,13 +165,6 @@ def _beside(scenario: dict[str, Any]) -> list[str]:
     """What says where the receivers of a recording stand, if it has one."""
     recording = scenario["motion"].get("recording")
     return [str(Path(recording).with_name(name)) for name in (DEVICES, PARAMETERS)] if recording else []
-
-
-def _sources(module: str) -> list[str]:
-    """Files of the modules of a module's package, as far as they are imported."""
-    top = module.partition(".")[0]
-    names = [name for name in sorted(sys.modules) if name == top or name.startswith(f"{top}.")]
-    return [str(file) for name in names if (file := getattr(sys.modules[name], "__file__", None))]
 
 
 def _plain(value: Any) -> Any:

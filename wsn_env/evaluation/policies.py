@@ -177,8 +177,8 @@ def _suggest_parameter(maker: Any, parameters: dict) -> str:
     return f": {suggest(strange[0], own)}" if strange and own else ""
 
 
-def read_saved(path: Path, key: str) -> Any:
-    """What a policy.json says under a key.
+def read_saved(path: Path, *keys: str) -> list[Any]:
+    """What a policy.json says under these keys.
 
     Raises:
         ValueError: the file is missing, damaged or another; names it.
@@ -186,7 +186,8 @@ def read_saved(path: Path, key: str) -> Any:
     if not path.is_file():
         raise ValueError(f"{path} is not a saved policy: there is no such file")
     try:
-        return json.loads(path.read_text(encoding="utf-8"))[key]
+        said = json.loads(path.read_text(encoding="utf-8"))
+        return [said[key] for key in keys]
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as problem:
         raise ValueError(f"{path} is not a saved policy: {problem!r}") from None
 
@@ -195,7 +196,7 @@ def load_learned(path: Path, scenario: Scenario) -> Policy:
     """A saved policy: its policy.json names the entry point of the kind that can read it."""
     if not path.exists():
         raise ValueError(f"policy {str(path)!r} does not exist")
-    kind = read_saved(path, "kind")
+    (kind,) = read_saved(path, "kind")
     if kind not in policy_names():
         raise ValueError(f"{path} is not a saved policy: its kind is {kind!r}, known are {', '.join(policy_names())}")
     try:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from dataclasses import is_dataclass
 from pathlib import Path
 from shutil import rmtree
@@ -11,7 +10,7 @@ from typing import Any
 
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.versions import sources_digest, versions
-from wsn_env.models.own_files import file_digest
+from wsn_env.models.own_files import file_digest, sources_of
 from wsn_env.scenario import Scenario
 
 CONFIG = "config.json"
@@ -61,8 +60,8 @@ def facts_of(settings: dict[str, Any], scenario: Scenario, script: Path) -> dict
     """
     decisive = {name: value for name, value in settings.items() if name not in (*FREE, "name")}
     kinds = {type(part).__module__ for part in vars(scenario).values() if is_dataclass(part)}
-    own = [sys.modules[kind].__file__ for kind in kinds if not kind.startswith("wsn_env.")]
-    contents = {str(file): file_digest(file) for file in (*own, *settings["tracks"]) if file}
+    own = [file for kind in kinds if not kind.startswith("wsn_env.") for file in sources_of(kind)]
+    contents = {file: file_digest(file) for file in (*own, *settings["tracks"])}
     sources = versions() | {"sources of wsn_env": sources_digest(), script.name: file_digest(script)}
     quantities: dict[str, Any] = {}
     for part, value in json.loads(json.dumps(scenario.as_dict(), default=str)).items():

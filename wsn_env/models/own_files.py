@@ -81,6 +81,13 @@ def _note_file(path: Path, notes: Iterable[dict[Path, str]]) -> None:
         each[path] = _stamps[path][1]
 
 
+def sources_of(module: str) -> list[str]:
+    """Files of the modules of a module's package, as far as they are imported."""
+    top = module.partition(".")[0]
+    names = [name for name in sorted(sys.modules) if name == top or name.startswith(f"{top}.")]
+    return [str(file) for name in names if (file := getattr(sys.modules[name], "__file__", None))]
+
+
 def file_digest(path: str | Path) -> str | None:
     """Of a file's content; None: it is no regular file, or cannot be read."""
     try:
