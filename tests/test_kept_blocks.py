@@ -17,6 +17,8 @@ from wsn_env.cli import main
 from wsn_env.evaluation.files import LOCK_FILE, alone_in, replacing
 from wsn_env.evaluation.kept_blocks import BLOCKS_FILE
 from wsn_env.evaluation.policies import named_policies
+from wsn_env.models import own_files
+from wsn_env.models.own_files import file_digest
 from wsn_env.models.recordings.dataset import read_dataset
 
 SCENARIO = Scenario.named("PreDC-v0", particles=30, nodes=20, side_m=40.0, crossing_m=15.0, periods=3)
@@ -25,8 +27,14 @@ SMALL = ["--set", "particles=30", "nodes=20", "side_m=40", "crossing_m=15", "per
 
 @pytest.fixture
 def played(monkeypatch):
-    """Names of the policies of the blocks that are played, not taken."""
+    """Names of the policies of the blocks that are played, not taken. Files that other tests have read and
+    changed are forgotten."""
     import wsn_env.evaluation.rollout as module
+
+    own_files.watch("tests")
+    for name in ("tests", own_files.IMPORTED):
+        current = {path: digest for path, digest in own_files._read[name].items() if file_digest(path) == digest}
+        monkeypatch.setitem(own_files._read, name, current)
 
     names, rollout = [], module.rollout
     monkeypatch.setattr(module, "rollout", lambda *given: names.append(type(given[0]).__name__) or rollout(*given))
