@@ -67,11 +67,22 @@ PROCESSORS = {
     "nehalem": lambda unit: True,
     "haswell": lambda unit: "AVX512" in unit or unit == "X86_V4",
 }
-PLAYED = {"nehalem": tuple(GOLDEN), "haswell": ("PreDC-v0",)}  # each compiles for long
 
 
 # A processor that nothing has been compiled for: `wsn compile` first, then `PLAY`, then the digests as on the others.
+# In short, what it does for a scenario, and `PLAY_ONE`.
 FRESH = "nehalem"
+SHORT = "Binary-v0"  # of those that take the least
+PLAY_ONE = """
+import gymnasium as gym, wsn_env
+from wsn_env.compiled import store
+for keywords in (dict(), dict(observation="menu", order="information", render_mode="rgb_array", frame_px=64)):
+    env = gym.make("wsn_env/Binary-v0", particles=60, periods=3, disable_env_checker=True, **keywords)
+    env.reset(seed=0)
+    env.step(10)
+wsn_env.evaluate(["nearest2", "greedy", "adaptive"], "Binary-v0", episodes=2)
+print("compiled:", *store.compiled)
+"""
 PLAY = """
 import gymnasium as gym, wsn_env
 from wsn_env.cli import main
@@ -114,44 +125,47 @@ print("compiled:", *store.compiled)
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("scenarios", [[SHORT], pytest.param([], marks=pytest.mark.full)], ids=["short", "all"])
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="names x86 processors")
-def test_other_processors_give_the_same_bits_and_wsn_compile_leaves_nothing_to_compile(tmp_path):
+def test_other_processors_give_the_same_bits_and_wsn_compile_leaves_nothing_to_compile(scenarios, tmp_path):
     """With one thread and with two; emulated ones run at once, the fresh one compiling for minutes."""
     started = {}
     for processor, lacks in PROCESSORS.items():
         lacking = [unit for unit in __cpu_dispatch__ if __cpu_features__[unit] and lacks(unit)]
         units = {"NUMBA_CPU_FEATURES": "", "NPY_DISABLE_CPU_FEATURES": " ".join(lacking), "NUMBA_CPU_NAME": processor}
-        if processor == FRESH:
-            units["NUMBA_CACHE_DIR"] = str(tmp_path)
+        units["NUMBA_CACHE_DIR"] = str(tmp_path / processor)
         started[processor] = subprocess.Popen(
-            [sys.executable, "-m", "tests.test_golden", *([FRESH] if processor == FRESH else []), *PLAYED[processor]],
+            [sys.executable, "-m", "tests.test_golden", *([FRESH] if processor == FRESH else []), *scenarios],
             env=os.environ | units,
             stdout=subprocess.PIPE,
             text=True,
             cwd=HERE,
         )
-    printed = {processor: process.communicate()[0].splitlines() for processor, process in started.items()}
+        if scenarios:
+            break
     for processor, process in started.items():
+        printed = process.communicate()[0].splitlines()
         assert process.returncode == 0, processor
-        lines = [f"{name} {threads} {GOLDEN[name]}" for name in PLAYED[processor] for threads in (1, 2)]
-        assert printed[processor][-len(lines) :] == lines, processor
-    compiling, played = printed[FRESH][:2]
-    assert int(compiling.split()[0]) > 50 and played == "compiled:"
+        lines = [f"{name} {threads} {GOLDEN[name]}" for name in scenarios or GOLDEN for threads in (1, 2)]
+        assert printed[-len(lines) :] == lines, processor
+        if processor == FRESH:
+            compiling, played = printed[:2]
+            assert int(compiling.split()[0]) > 10 and played == "compiled:"
 
 
-def first_time() -> None:
+def first_time(names: list[str]) -> None:
     """What `wsn compile` says, and what playing then compiles."""
-    for command in (["-m", "wsn_env", "compile"], ["-c", PLAY]):
-        print(
-            subprocess.run([sys.executable, *command], capture_output=True, text=True, check=True).stdout.splitlines()[
-                -1
-            ]
-        )
+    one = "from wsn_env.evaluation.warm_up import *; print(sum(compile_job(job) for job in JOBS if job.scenario in {}))"
+    both = (["-c", one.format(names)], ["-c", PLAY_ONE]) if names else (["-m", "wsn_env", "compile"], ["-c", PLAY])
+    for command in both:
+        done = subprocess.run([sys.executable, *command], capture_output=True, text=True, check=True)
+        print(done.stdout.splitlines()[-1])
 
 
 if __name__ == "__main__":
+    named = [name for name in GOLDEN if name in sys.argv[1:]]
     if sys.argv[1:2] == [FRESH]:
-        first_time()
-    for name in [name for name in GOLDEN if name in sys.argv[1:]] or GOLDEN:
+        first_time(named)
+    for name in named or GOLDEN:
         for threads in (1, 2):
             print(name, threads, digest(name, 12, threads))

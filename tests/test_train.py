@@ -25,7 +25,7 @@ from wsn_env.learning.network import EntryNetwork, PolicyNetwork
 from wsn_env.reports.pages.learning_curves import read_progress
 
 SET = ["particles=50", "nodes=40", "side_m=50", "crossing_m=20", "periods=10"]
-SHORT = dict(steps=4096, rows=32, rollout=32, batch=512, epochs=2, episodes=60, checkpoint_steps=1024, set=SET)
+SHORT = dict(steps=4096, rows=32, rollout=32, batch=512, epochs=2, episodes=8, checkpoint_steps=1024, set=SET)
 
 
 @pytest.fixture(scope="module")
