@@ -93,7 +93,9 @@ def draw_case(rng: Random, usual: bool = False) -> Case:
     }
     if rng.random() < 0.3:
         keywords["candidates"] = rng.randint(9 if keywords["action"] == "menu" else 1, SMALL["candidates"])
-    if rng.random() < 0.05 and not usual:
+    if rng.random() < 0.1:
+        keywords |= dict(render_mode="rgb_array", frame_px=rng.choice([16, 64, 100, 333]))
+    if rng.random() < 0.1 and not usual:
         keywords["fast"] = True
     return Case(name, keywords, rng.randrange(2**31))
 
@@ -292,6 +294,7 @@ def play_environments(case: Case, env: gym.Env) -> int:
         check_observation(envs, observations, "observations")
         check_numbers(env.unwrapped, info, battery)
         check_numbers(envs.unwrapped, infos, battery)
+        check_frames(case, env, envs, row)
         assert_row(observations, observation, row, "observation")
         actions = [envs.single_action_space.sample() for _ in range(ROWS)]
         if case.keywords.get("action") not in ("radius", "scores"):
@@ -345,6 +348,16 @@ def check_numbers(env, info: dict[str, Any], battery_j: float) -> None:
     assert (np.diagonal(state.belief.cov, axis1=1, axis2=2) >= 0).all(), "variances below 0"
     for residual in (state.residual_j, env.view.battery):
         assert ((residual >= 0) & (residual <= battery_j)).all(), "batteries outside of 0 to full"
+
+
+def check_frames(case: Case, env, envs, row: int) -> None:
+    """A picture of the size asked for, the same of a row of a batch, where pictures are asked for."""
+    px = case.keywords.get("frame_px")
+    if px is not None:
+        frame, frames = env.render(), envs.render()
+        assert frame.shape == (px, px, 3) and frame.dtype == np.uint8, f"frame {frame.shape} {frame.dtype}"
+        assert frame.std() > 0, "nothing on a frame"
+        np.testing.assert_array_equal(frames[row], frame, "frame of a row")
 
 
 def assert_row(batch, single, row: int, name: str) -> None:

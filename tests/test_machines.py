@@ -2,6 +2,7 @@
 
 import ast
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -43,6 +44,16 @@ def test_a_comparison_leaves_the_same_files_whatever_the_terminal(tmp_path):
     shell = "sh", "-c", 'exec "$@" >&- 2>&- <&-', "sh"
     (status, *_), others = play(tmp_path / "closed", *shell)
     assert status == 0 and others == files
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("after", [COMMAND, "-m wsn_env replay --out out.html --set particles=50 periods=5".split()])
+def test_no_network_is_needed(after, tmp_path):
+    alone = "unshare", "--net"
+    if shutil.which("unshare") is None or subprocess.run([*alone, "true"], capture_output=True).returncode:
+        pytest.skip("no network can be taken away here")
+    (status, _, said), files = play(tmp_path / "alone", *alone, after=after)
+    assert status == 0 and files, said
 
 
 @pytest.mark.parametrize("after", [["-m", "wsn_env", "--help"], ["train.py", "--help"]], ids=["wsn", "train"])

@@ -3,7 +3,9 @@
 import os
 import subprocess
 import sys
+import tempfile
 from io import BytesIO, TextIOWrapper
+from pathlib import Path
 
 import pytest
 
@@ -134,6 +136,60 @@ def test_a_full_disk_is_a_line_with_the_file_and_what_was_there_stays(name, data
 @pytest.mark.parametrize("name", with_short("evaluate", "replay"))
 def test_a_folder_that_nobody_may_write_into_is_told_before_anything_is_played(name, data, tmp_path):
     play(CLOSED, name, data, tmp_path)
+
+
+TRAIN = """
+import contextlib, io, os, resource, sys
+from pathlib import Path
+import train
+
+folder = Path(sys.argv[1])
+def run(name, *more):
+    sizes = "--steps 512 --rows 16 --rollout 16 --batch 128 --epochs 1 --episodes 0 --checkpoint-steps 256".split()
+    small = "--set particles=30 nodes=20 side_m=40 crossing_m=15 periods=3".split()
+    return train.main(["--runs", str(folder), "--name", name, *more, *sizes, *small])
+def limited(size):
+    child = os.fork()
+    if child == 0:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+        with contextlib.redirect_stderr(io.StringIO()) as said:
+            status = run("limited", "--resume")
+        os.write(pipe[1], said.getvalue().encode())
+        os._exit(status)
+    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    return status, os.read(pipe[0], 10000).decode()
+pipe = os.pipe()
+assert run("whole") == 0
+kept = ("policy.safetensors", "checkpoint.safetensors")
+whole = {name: (folder / "whole" / name).read_bytes() for name in kept}
+for size in (100, 2000, len(whole["policy.safetensors"]) - 1, len(whole["checkpoint.safetensors"]) - 1):
+    status, said = limited(size)
+    assert status == 2, (size, status, said)
+    assert said.startswith("train.py: ") and said.count("\\n") == 1 and "File too large" in said, (size, said)
+    assert f"'{folder}" in said, said
+    hidden = [path for path in (folder / "limited").rglob("*") if path.name.startswith(".")]
+    assert not hidden, hidden
+assert run("limited", "--resume") == 0
+for name in kept:
+    assert (folder / "limited" / name).read_bytes() == whole[name], name
+os.chmod(folder, 0o755)
+if os.getuid() == 0:
+    os.setgroups([]), os.setgid(65534), os.setuid(65534)
+train.learn_locally = lambda *given: os._exit(9)
+with contextlib.redirect_stderr(io.StringIO()) as said:
+    status = run("nobody")
+assert (status, said.getvalue().count("\\n")) == (2, 1) and "Permission denied" in said.getvalue(), said.getvalue()
+"""
+
+
+@pytest.mark.slow
+def test_training_where_nothing_can_be_written(tmp_path):
+    """What was trained before the disk was full is not lost."""
+    for path in (tmp_path, *tmp_path.parents):  # pytest's are for their owner alone
+        if path.stat().st_uid == os.getuid() and Path(tempfile.gettempdir()) in path.parents:
+            path.chmod(0o755)
+    done = subprocess.run([sys.executable, "-c", TRAIN, tmp_path], capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr[-3000:]
 
 
 @pytest.fixture

@@ -18,11 +18,11 @@ class Field(Section):
     """Where the nodes stand: drawn in a square, anew in every episode unless fixed."""
 
     nodes: int = quantity(225, "number of sensor nodes S", at_least=1, at_most=10_000_000, whole=True)
-    side_m: float = quantity(100.0, "side of the square field", above=0, at_most=100_000)
+    side_m: float = quantity(100.0, "side of the square field", at_least=1e-3, at_most=100_000)
     depth_m: float | None = quantity(
         None,
         "depth of the room along y, whose width is side_m; None: a square",
-        above=0,
+        at_least=1e-3,
         at_most=100_000,
         optional=True,
     )
