@@ -47,7 +47,9 @@ def test_a_comparison_leaves_the_same_files_whatever_the_terminal(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("after", [COMMAND, "-m wsn_env replay --out out.html --set particles=50 periods=5".split()])
+@pytest.mark.parametrize(
+    "after", [COMMAND, "-m wsn_env replay --policy nearest1 --out out.html --set particles=50 periods=5".split()]
+)
 def test_no_network_is_needed(after, tmp_path):
     alone = "unshare", "--net"
     if shutil.which("unshare") is None or subprocess.run([*alone, "true"], capture_output=True).returncode:
