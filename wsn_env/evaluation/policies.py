@@ -7,6 +7,7 @@ an object with `act(view) -> Cluster`.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from inspect import signature
@@ -153,9 +154,8 @@ def _create_policy(name: str, maker, scenario: Scenario, parameters: dict) -> Po
         if wrong:
             raise wrong from None
         if isinstance(problem, TypeError):
-            told = (
-                f"cannot be made with a scenario and its parameters: {problem}{_suggest_parameter(maker, parameters)}"
-            )
+            said = re.sub(r"\. Did you mean '\w+'\?$", "", str(problem))  # since Python 3.13; ours knows more names
+            told = f"cannot be made with a scenario and its parameters: {said}{_suggest_parameter(maker, parameters)}"
             raise ValueError(f"policy {name!r}: {own_place(problem)}{told}") from problem
         if not own_place(problem):
             raise
