@@ -20,7 +20,7 @@ from wsn_env.agents.adaptive import RULES, Adaptive, Switch
 from wsn_env.agents.greedy import Greedy, Terms
 from wsn_env.agents.nearest import ORDERS, Nearest
 from wsn_env.agents.tuned import TABLE
-from wsn_env.evaluation.files import replacing
+from wsn_env.evaluation.files import check_replaceable, replacing
 from wsn_env.evaluation.policies import Policy
 from wsn_env.evaluation.progress import Progress, progress_bar
 from wsn_env.evaluation.rollout import BLOCK, evaluation_seeds, rollout
@@ -141,6 +141,8 @@ def tune_greedy(trials: Trials) -> list[Terms]:
 def main(arguments: list[str] | None = None) -> None:
     """Tune and write the table."""
     settings = tyro.cli(Tuning, description=__doc__, args=arguments)
+    settings.out.parent.mkdir(parents=True, exist_ok=True)
+    check_replaceable(settings.out)
     table = json.loads(settings.out.read_text(encoding="utf-8")) if settings.out.exists() else {"scenarios": {}}
     for name in settings.scenario:
         scenario = Scenario.named(name)

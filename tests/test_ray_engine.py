@@ -189,6 +189,7 @@ def test_relative_paths_and_files_beside_an_own_one_reach_workers_begun_elsewher
         ray.shutdown()
 
 
+@pytest.mark.slow
 @pytest.mark.full
 @pytest.mark.parametrize("process", ["gcs_server", "raylet"])
 def test_a_lost_cluster_is_a_line_and_the_same_command_continues(process, tmp_path, monkeypatch):

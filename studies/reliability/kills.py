@@ -33,8 +33,10 @@ COMMANDS = {
     "calibrate": "wsn calibrate --tracks WALKS --out OUT",
     "reproduce": "wsn reproduce underwater --runs 2 --out OUT",
     "train": TRAIN,
+    "tuning": "studies.tuning --scenario PreDC-v0 --lams 4 --episodes 1 --out OUT/tuned.json",
 }
 DECISIVE = {"train": ("policy.safetensors", "checkpoint.safetensors")}  # the rest tells times
+MOST_TRIES = 3  # for a kill before the end
 EVENTS = ("open", "os.rename", "os.remove")
 
 
@@ -49,7 +51,7 @@ class Kills:
     files: tuple[int, ...] = ()
     """Kill it as it opens, renames or removes its so many-th file."""
     random: int = 0
-    """Kill it so often at random, by turns at a file and at a time."""
+    """Kill it so often before its end, at random: by turns at a file and at a time."""
     blank: bool = False
     """Write pictures that show nothing."""
 
@@ -74,6 +76,10 @@ def kill(name: str, folder: Path, *more: str) -> dict[str, Any]:
 def _run(command: list[str]) -> int:
     if command[0] == "wsn":
         return wsn(command[1:])
+    if command[0] == "studies.tuning":
+        from studies import tuning
+
+        return tuning.main(command[1:]) or 0
     import train
 
     return train.main(command[1:])
@@ -142,15 +148,17 @@ def main(arguments: list[str] | None = None) -> None:
     status, count = run(0)
     seconds, whole = time.monotonic() - started, files(0)
     assert status == 0 and whole, (status, whole.keys())
-    rng, moments = random.Random(22), [(last, None) for last in asked.files]
-    moments += [
-        (rng.randint(1, count), None) if k % 2 else (0, rng.uniform(0.02, 0.98) * seconds) for k in range(asked.random)
-    ]
-    killed, differ = 0, []
-    for number, moment in enumerate(moments, 1):
-        killed += os.WIFSIGNALED(run(number, *moment)[0])
-        assert run(number)[0] == 0, moment
-        made = files(number)
+    rng, tries, killed = random.Random(22), 0, 0
+    differ: list[str] = []
+    while tries < max(len(asked.files), MOST_TRIES * asked.random) and killed < max(len(asked.files), asked.random):
+        tries += 1
+        if asked.files:
+            moment: Any = (asked.files[tries - 1], None)
+        else:
+            moment = (rng.randint(1, count), None) if tries % 2 else (0, rng.uniform(0.02, 0.98) * seconds)
+        killed += os.WIFSIGNALED(run(tries, *moment)[0])
+        assert run(tries)[0] == 0, moment
+        made = files(tries)
         differ += [f"{moment}: {path}" for path in made.keys() | whole.keys() if made.get(path) != whole.get(path)]
     print(json.dumps({"killed": killed, "differ": differ}))
 
