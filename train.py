@@ -255,7 +255,7 @@ def learn_on_ray(settings: Training, scenario: Scenario, interface: Settings, fo
     whole = make_envs(settings, scenario, interface, len(settings.vary or ()) + 1)
     training = RayTraining(
         lambda rows: make_envs(settings, scenario, interface, rows),
-        entry_sizes(settings.action, whole.single_observation_space, settings.units, settings.critic),
+        entry_sizes(settings.action, whole.interface.observation, settings.units, settings.critic),
         folder,
         steps=settings.steps,
         facts=facts_of(settings_as_json(settings), scenario, Path(__file__)),
@@ -358,7 +358,8 @@ def architecture(settings: Training, envs) -> tuple:
     """The kind of PPO's policy, and its arguments."""
     if settings.network == "flat":
         return "MlpPolicy", {"net_arch": {"pi": list(settings.units), "vf": list(settings.critic)}}
-    entries = entry_sizes(settings.action, envs.observation_space, settings.units, settings.critic)
+    (interface,) = envs.get_attr("interface", 0)
+    entries = entry_sizes(settings.action, interface.observation, settings.units, settings.critic)
     return EntryPolicy, {"entries": entries}
 
 

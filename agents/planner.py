@@ -143,7 +143,7 @@ class Planner(ViewPolicy):
         for period in range(self.horizon):
             cluster = choice if period == 0 else rule.act(View(state.knowledge))
             state, outcome = self._world.step(state, cluster, donate=True)
-            costs += weight * (belief_cost(outcome.row) + lam * outcome.energy_mj)
+            costs += weight * (belief_cost(outcome.row, self.scenario.counted_m) + lam * outcome.energy_mj)
             weight *= self.discount
         return costs
 

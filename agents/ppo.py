@@ -22,6 +22,7 @@ from wsn_env.evaluation.policies import read_saved
 from wsn_env.learning.network import EntryNetwork, FlatNetwork, PolicyNetwork
 from wsn_env.models.arguments import checked
 from wsn_env.models.own_files import file_digest
+from wsn_env.models.quantity import short
 from wsn_env.models.state import Cluster
 from wsn_env.simulation.view import View
 
@@ -33,9 +34,13 @@ INTERFACES = (("menu", "menu"), ("menu", "candidates"), ("subset", "candidates")
 @dataclass(frozen=True, repr=False)
 class PPOPolicy(ViewPolicy):
     """Takes the most probable action of the network that `train.py` saved at `path` (a policy.json); left out: of the
-    one that comes with the package for the scenario of this name."""
+    one that comes with the package for the scenario named `of`, or left out, too, for the scenario of this name.
+
+    One that was trained where energy is not scarce sees nothing of it where it is.
+    """
 
     path: str | Path = ""
+    of: str = ""
 
     def __post_init__(self) -> None:
         """Read the files now: a missing one is known before anybody plays."""
@@ -52,11 +57,14 @@ class PPOPolicy(ViewPolicy):
 
     @cached_property
     def _interface_and_network(self) -> tuple[Interface, FlatNetwork | EntryNetwork]:
-        path = Path(self.path or PRETRAINED / self.scenario.name / "policy.json")
+        home = self.of or self.scenario.name
+        path = Path(self.path or PRETRAINED / home / "policy.json")
         if not self.path and not path.exists():
             shipped = ", ".join(sorted(folder.name for folder in PRETRAINED.iterdir() if folder.is_dir()))
+            if self.of:
+                raise ValueError(f"PPOPolicy.of = {short(repr(self.of))}: allowed are {shipped}")
             raise ValueError(
-                f"policy 'ppo': none comes with the package for {self.scenario.name}, only for {shipped}: train one"
+                f"policy 'ppo': none comes with the package for {home}, only for {shipped}: train one"
                 " with train.py and name its policy.json"
             )
         said, digest = read_saved(path, "interface", DIGEST)
@@ -65,17 +73,20 @@ class PPOPolicy(ViewPolicy):
             if (settings.action, settings.observation) not in INTERFACES:
                 pair = settings.action, settings.observation
                 raise ValueError(f"(action, observation) = {pair}: must be one of {INTERFACES}")
-            interface = Interface(self.scenario, settings)
+            interfaces = [Interface(self.scenario, settings)]
+            if self.scenario.scarce_energy:
+                interfaces.append(Interface(self.scenario.override(scarce_energy=False), settings))
         except (TypeError, ValueError) as problem:
             raise ValueError(f"{path} is not a saved policy: {problem}") from None
         weights = path.with_suffix(".safetensors")
         network = PolicyNetwork.load(weights)
         if digest != file_digest(weights):
             raise ValueError(f"{weights} is not the network that {path} was saved with: it is damaged, or another's")
-        inputs, logits = interface.observation.space.shape[0], sum(_logit_counts(interface.action.space))
-        if not network.fits(inputs, logits):
-            raise ValueError(f"{path}: its network does not map {inputs} numbers to {logits}, as the environment wants")
-        return interface, network
+        for interface in interfaces:
+            inputs, logits = interface.observation.space.shape[0], sum(_logit_counts(interface.action.space))
+            if network.fits(inputs, logits):
+                return interface, network
+        raise ValueError(f"{path}: its network does not map {inputs} numbers to {logits}, as the environment wants")
 
     def act(self, view: View) -> Cluster:
         """The most probable action, for every row."""

@@ -64,6 +64,7 @@ MAKERS: dict[str, list[list[str]]] = {  # arguments of Python, one command after
     "reproduce": [["-m", "wsn_env", "reproduce", "all", "--out", "{out}"]],
     "tables": [["-m", "studies.tables", "--out", "{out}"]],
     "bound": [["-m", "studies.bound", "--out", "{out}"]],
+    "lifetime": [["-m", "studies.lifetime", "--out", "{out}"]],
     "reliability": [["-m", "studies.reliability", "--out", "{out}"]],
     "planning": [
         ["-m", "studies.planning", "--scenario", name, "--out", "{out}/" + name] for name in ("PreDC-v0", "Rssi-v0")

@@ -26,6 +26,7 @@ POLICIES = (  # where a policy is at home
     *((name, "Rssi-v0") for name in ("informed3", "adaptive_informed")),
     *((name, "Binary-v0") for name in ("boundary",)),
     *((name, "Underwater-v0") for name in ("strongest_signal",)),
+    *((name, "Lifetime-v0") for name in ("budget",)),
     *((name, "Ble-v0") for name in ("all", "strongest", "quadrants", "every")),
 )
 HOME = {"Binary-v0": "boundary", "Anchors-v0": "nearest2", "Underwater-v0": "strongest_signal", "Ble-v0": "informed3"}

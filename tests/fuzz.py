@@ -136,7 +136,7 @@ def draw_quantities(rng: Random, sections: dict[str, Any]) -> dict[str, Any]:
                 if rng.random() < 0.25:
                     drawn[item.name] = rng.choice(allowed["choices"])
                 continue
-            whole = allowed.pop("whole", False)
+            whole, paired = allowed.pop("whole", False), allowed.pop("drawn", False)
             scale = size if item.name.endswith(LENGTHS) else 1.0
             chance = rng.random()
             if chance < wild:
@@ -146,6 +146,11 @@ def draw_quantities(rng: Random, sections: dict[str, Any]) -> dict[str, Any]:
             else:
                 continue
             drawn[item.name] = within(value, whole, **allowed)
+            if paired and drawn[item.name] and rng.random() < 0.4:
+                drawn[item.name] = (
+                    drawn[item.name],
+                    within(drawn[item.name] * 10 ** rng.uniform(0, 2), whole, **allowed),
+                )
     for name in ("periods", "particles"):
         drawn[name] = min(drawn.get(name, SMALL[name]), rng.randint(2, SMALL[name]))
     return drawn
@@ -232,7 +237,8 @@ def draw_others(rng: Random, sections: dict[str, Any], keywords: dict[str, Any])
     """What fits the quantities drawn before, or has rules of its own."""
     drawn: dict[str, Any] = {}
     if rng.random() < 0.3:
-        drawn["battery_j"] = float(f"{log_uniform(rng, 1e-9, 1e-2):.3g}")
+        low, more = float(f"{log_uniform(rng, 1e-9, 1e-2):.3g}"), rng.choice([1.0, 1.0, 10.0])
+        drawn["battery_j"] = low if more == 1.0 else (low, more * low)
     lam = rng.choice([None, None, 0, 1e-9, MOST_LAM, (1e-9, MOST_LAM), (0.3, 30.0)])
     if lam is not None:
         drawn["lam"] = lam
@@ -287,7 +293,7 @@ def play_environments(case: Case, env: gym.Env) -> int:
     envs.single_action_space.seed(case.seed)
     observation, info = env.reset(seed=seeds[row])
     observations, infos = envs.reset(seed=seeds)
-    battery = env.unwrapped.scenario.radio.battery_j
+    battery = env.unwrapped.scenario.radio.most_battery_j
     periods, ended = 0, np.zeros(ROWS, bool)
     while not ended[row]:
         check_observation(env, observation, "observation")

@@ -25,6 +25,7 @@ SMALL_OTHERS = {  # small enough, in a field of their own
     "Anchors-v0": dict(particles=64, periods=7),
     "Underwater-v0": dict(particles=64, nodes=36, periods=7),
     "Ble-v0": dict(particles=64, periods=7),
+    "Lifetime-v0": dict(particles=64, nodes=40, side_m=50.0, periods=7),
 }
 
 

@@ -95,7 +95,7 @@ def small_case():
 def test_broken_laws_are_seen(small_case, monkeypatch):
     assert fuzz.broken_law(small_case) == (3 * 2 * (fuzz.ROWS + 1), "")
     with monkeypatch.context() as patch:
-        patch.setitem(rewards.COSTS, "error", lambda outcome: outcome["error_m"] * np.nan)
+        patch.setitem(rewards.COSTS, "error", lambda outcome, counted: outcome["error_m"] * np.nan)
         assert fuzz.broken_law(small_case)[1].startswith("AssertionError in check_numbers: info reward_error")
     with monkeypatch.context() as patch:
         whole = View.as_arrays

@@ -28,6 +28,7 @@ GOLDEN = {
     "Binary-v0": "80f3a96dbc277155f7cc1020a286c30887180e4b584591f16be7f323cfe0dc24",
     "Anchors-v0": "0282a0b8404a233d8b2d7dd0ab40b791daf929f8c68c2bc7f1c8067958147b81",
     "Underwater-v0": "1166cca6c6d41f1fa1409332cee6f8a4a257b533dab97eae42953360828aed70",
+    "Lifetime-v0": "aaebf64b934c7f7857e3b0d47eb4aa70ddbbcc3d05b8c92f43f1acae3ddbb535",
     "Ble-v0": "f4624d31aa889db826b1b7473f1e807854dd3ae512853e9fcc1a12be8fe1218b",
 }
 

@@ -208,7 +208,7 @@ def test_a_reset_gives_the_same_world_twice():
 
 def rounding(scenario):
     """Of a battery of 1 J, or as much as it has [J]."""
-    return 1e-15 * max(1.0, scenario.radio.battery_j)
+    return 1e-15 * max(1.0, scenario.radio.most_battery_j)
 
 
 @law(240)
@@ -248,7 +248,7 @@ def test_batteries_lose_what_the_outcome_reports(scenario, seed):
 def test_the_first_search_is_charged(scenario, seed):
     world, keys = World(scenario, threads=1), keys_of(seed, 4)
     state, outcome = world.restart(world.reset(keys), np.ones(4, bool), keys)
-    spent = scenario.radio.battery_j - state.residual_j
+    spent = state.full_j[:, None] - state.residual_j
     np.testing.assert_allclose(spent, outcome.spent_j, rtol=0, atol=rounding(scenario))
     np.testing.assert_allclose(outcome.energy_j.sum(axis=1), outcome.spent_j.sum(axis=1), rtol=1e-12, atol=1e-18)
     np.testing.assert_array_equal(state.network.alive, (state.network.battery > 0).sum(axis=1))

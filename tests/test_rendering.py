@@ -19,6 +19,9 @@ from wsn_env.envs.rendering.plan import WORDS_FROM, legend, plan_of
 GOLDEN = Path(__file__).parent / "golden" / "frame.png"
 
 
+CLEAR = {"Lifetime-v0": 4}  # seeds of pictures in which nothing covers what is looked for; else 1
+
+
 def played(actions, seed=0, scenario="PreDC-v0", **keywords):
     """An environment after some actions, and the info of the last."""
     env = ClusterEnv(scenario, render_mode="rgb_array", **keywords)
@@ -58,7 +61,7 @@ def off(picture, points, colour):
 @pytest.mark.parametrize("name", IDS)
 @pytest.mark.parametrize("size", [64, 300, 600])
 def test_frames_show_target_head_and_awake_nodes_where_they_are(name, size):
-    env, _ = played([13, 13], seed=1, scenario=name, frame_px=size)
+    env, _ = played([13, 13], seed=CLEAR.get(name, 1), scenario=name, frame_px=size)
     picture, view, scenario = env.render(), env.view, env.scenario
     assert picture.shape == (size, size, 3) and picture.dtype == np.uint8
     plan = plan_of(size, name, scenario.field.room_m, legend(scenario))

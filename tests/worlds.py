@@ -40,7 +40,9 @@ def scenarios(draw, trackers=TRACKERS, modem_hops_m=(30.0, 70.0, 250.0), **fixed
         measurement=measurement,
         packet_success=draw(st.sampled_from([1.0, 0.9, 0.3, 0.0])),
         retries=draw(st.integers(0, 4)),
-        battery_j=draw(st.sampled_from([1.0, 1e-3, 2e-4, 5e-5, 1e-6])),
+        battery_j=draw(st.sampled_from([1.0, 1e-3, (5e-5, 2e-3), 2e-4, 5e-5, 1e-6])),
+        error_cap_m=draw(st.sampled_from([None, 20.0])),
+        scarce_energy=draw(st.booleans()),
         handover=draw(st.sampled_from(["estimate", "estimate", "particles"])),
         receiver=draw(st.sampled_from(["head", "head", "sink", "target"])),
         tracker=tracker,
@@ -73,7 +75,7 @@ def scenarios(draw, trackers=TRACKERS, modem_hops_m=(30.0, 70.0, 250.0), **fixed
     overrides |= fixed
     if measurement == "sonar" or (measurement == "position" and draw(st.booleans())):
         overrides |= dict(radio="modem", hop_m=draw(st.sampled_from(modem_hops_m)), receiver="head")
-        overrides["battery_j"] *= MODEM_J
+        overrides["battery_j"] = np.multiply(overrides["battery_j"], MODEM_J).tolist()
     else:
         overrides["sensing_nj"] = draw(st.sampled_from([0.0, 1500.0]))
     return Scenario.named("PreDC-v0", **overrides)

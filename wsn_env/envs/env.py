@@ -21,6 +21,7 @@ from wsn_env.models.quantity import whole_number
 from wsn_env.models.state import OUTCOME, Outcome, State
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.quantities import Quantities
+from wsn_env.simulation.lifetime import lifetimes
 from wsn_env.simulation.reference import Reference, has_reference
 from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World
@@ -127,6 +128,7 @@ class ClusterEnv(gym.Env):
         if self._ended:
             info["episode_rms_m"] = math.sqrt(self._squares / (self._period - self.scenario.unscored))
             info["antnp"] = self._detections / self._period
+            info |= {name: values.item() for name, values in lifetimes(self._state, self.scenario.periods).items()}
             if self.scenario.ends_outside:
                 left = self.scenario.periods - self._period
                 reward, info["reward_rest"] = self.interface.charge_rest(reward, self._lam, left)

@@ -28,6 +28,7 @@ EXPECTED = record(
         ("x", "f8"),  # m
         ("y", "f8"),
         ("distance_m", "f8"),  # of a candidate, to the prediction
+        ("left", "f8"),  # share of its battery
         ("detection", "f8"),  # probability that it has something to report
         ("detection_ahead", "f8"),  # the same AHEAD periods on, if the target keeps its velocity
         ("silence_informs", "i8"),  # 1: its silence tells as much as its report
@@ -164,6 +165,7 @@ def _expect_node(known, b, node, depth, c, e):
         return
     place, m, p = node_of(sensors_of(known, b), node), known.belief[b].predicted_mean, known.belief[b].predicted_cov
     e.x, e.y = place.x, place.y
+    e.left = known.network.battery[b, node] / known.row[b].full_j
     if depth >= REPORTS:
         target = PositionBelief(m[0], m[2], p[0, 0], p[0, 2], p[2, 2])
         e.detection = chance(c.measurement, place, target, c)

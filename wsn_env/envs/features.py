@@ -8,6 +8,8 @@ from wsn_env.compiled.elementary import log
 from wsn_env.compiled.kernels import lean_piece
 from wsn_env.envs.expectations import Outlook
 from wsn_env.envs.merit import gain, position_cov, squared_between
+from wsn_env.scenario import Scenario
+from wsn_env.simulation.geometry import share_left_about
 
 BELIEF_FEATURES = (
     "lam",  # log, halved
@@ -30,6 +32,13 @@ BELIEF_FEATURES = (
     "joint_detection",  # of the standing cluster
     "sparseness",  # distance of the ninth nearest candidate
 )
+ENERGY_FEATURES = (  # behind them, where energy is scarce
+    "time_left",  # share of the horizon
+    "supply",  # log of the energy left, in what a typical schedule spends in the time left
+    "energy_left",  # share of all batteries
+    "energy_near",  # of those about the prediction
+    "energy_ahead",  # of those about where the target will be FAR_AHEAD periods on, if it keeps its velocity
+)
 CANDIDATE_FEATURES = (
     "ahead",  # in radii along and across the velocity, from the prediction
     "left",
@@ -44,8 +53,15 @@ CANDIDATE_FEATURES = (
     "merit_drop",  # drop of the expected sd that it brings there, as a share of the prediction's
 )
 WIDTH = len(CANDIDATE_FEATURES)
+G = len(BELIEF_FEATURES)
+FAR_AHEAD = 15.0
 BOUND = 10.0
 NINTH = 9
+
+
+def belief_features(scenario: Scenario) -> tuple[str, ...]:
+    """What observations tell of a row's belief, and of its energy where that is scarce."""
+    return BELIEF_FEATURES + (ENERGY_FEATURES if scenario.scarce_energy else ())
 
 
 class Heading(NamedTuple):
@@ -86,6 +102,42 @@ def describe_belief(outlook: Outlook, row: Any, reports: int, radius_m: float, f
 
 
 @lean_piece
+def describe_row(known: Any, b: int, outlook: Outlook, c: Any, f: np.ndarray) -> tuple[Heading, int]:
+    """Fill the beginning of f with `belief_features` of row b.
+
+    Args:
+        known: what the network knows (Knowledge).
+        outlook: of the row, to the depth REPORTS.
+        c: the scenario's common constants.
+
+    Returns: the direction of the predicted velocity, and how many features they are.
+    """
+    heading = describe_belief(outlook, known.row[b], known.reports.count[b], c.radius_m, f[:G])
+    if c.scarce_energy:
+        describe_energy(known, b, c, f[G : G + len(ENERGY_FEATURES)])
+        return heading, G + len(ENERGY_FEATURES)
+    return heading, G
+
+
+@lean_piece
+def describe_energy(known: Any, b: int, c: Any, f: np.ndarray) -> None:
+    """Fill f with ENERGY_FEATURES of row b.
+
+    Args:
+        known: what the network knows (Knowledge).
+        c: the scenario's common constants.
+    """
+    row, network, mean = known.row[b], known.network, known.belief[b].predicted_mean
+    periods, left_j = max(c.periods - row.period, 1.0), max(network.row[b].left_j, 0.0)
+    f[0] = (c.periods - row.period) / c.periods
+    f[1] = 0.25 * log(max(1e3 * left_j / (c.typical_energy_mj * periods), 1e-6))
+    f[2] = left_j / (row.full_j * network.battery.shape[1])
+    f[3] = share_left_about(network, b, mean[0], mean[2], row.full_j)
+    ahead = FAR_AHEAD * c.period_s
+    f[4] = share_left_about(network, b, mean[0] + ahead * mean[1], mean[2] + ahead * mean[3], row.full_j)
+
+
+@lean_piece
 def _write_place(node, outlook, heading, radius_m, f):
     """f (2,): where a node stands from the prediction, in radii along and across the velocity."""
     dx, dy = (node.x - outlook.mean[0]) / radius_m, (node.y - outlook.mean[2]) / radius_m
@@ -117,7 +169,7 @@ def _describe_ellipse(outlook, radius_m, f):
 
 @lean_piece
 def describe_candidate(outlook: Outlook, place: int, heading: Heading, radius_m: float, g: np.ndarray) -> None:
-    """g[0:7], g[8]: a candidate's place, its chance of detection, role and gain.
+    """g[0:9]: a candidate's place, its chance of detection, role, battery and gain.
 
     Args:
         outlook: to the depth REPORTS.
@@ -135,6 +187,7 @@ def describe_candidate(outlook: Outlook, place: int, heading: Heading, radius_m:
             g[5] = 1.0
     if node.node == head.node:
         g[6] = 1.0
+    g[7] = node.left
     g[8] = 0.25 * log(max(gain(node, 1.0, p)[0] / (p.xx + p.yy + 1e-12), 1e-6))
 
 

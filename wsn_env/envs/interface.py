@@ -61,13 +61,14 @@ class Interface:
             settings.observation, scenario, settings.order, settings.candidates, threads
         )
         self.reward_space: Box | None = reward_space(settings.reward)
-        self._reward = make_reward(settings.reward)
+        self._reward = make_reward(settings.reward, scenario.counted_m)
+        self._counted = scenario.counted_m
         self._reference = scenario.reference_error_m, scenario.reference_energy_mj
 
     def reward_and_info(self, outcome: Any, lam: Any) -> tuple[Any, dict[str, Any]]:
         """A period's reward and info, of arrays (B, ...) or of one row's numbers."""
         reward = self._reward(outcome, lam)
-        return reward, period_info(outcome, lam, reward if self.reward_space is None else None)
+        return reward, period_info(outcome, lam, reward if self.reward_space is None else None, self._counted)
 
     def charge_rest(self, reward: Any, lam: Any, periods: Any) -> tuple[Any, Any]:
         """Charge the periods that are left when an episode ends outside the field: ending must never pay.

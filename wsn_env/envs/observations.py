@@ -8,20 +8,20 @@ import numpy as np
 from gymnasium import spaces
 
 from wsn_env.compiled.kernels import Pinned, every_row, kernel, lean_piece, over_rows, threads_for
-from wsn_env.envs import features, prospects
+from wsn_env.envs import features
 from wsn_env.envs.actions import GROUP, MENU_ENTRIES
 from wsn_env.envs.expectations import REPORTS, REPORTS_AHEAD, Expectations, Expected, outlook_of
 from wsn_env.envs.features import (
-    BELIEF_FEATURES,
     BOUND,
     CANDIDATE_FEATURES,
+    belief_features,
     clip,
-    describe_belief,
     describe_candidate,
     describe_merit,
+    describe_row,
 )
 from wsn_env.envs.merit import ORDERS, RANKED, order_row, rank_row
-from wsn_env.envs.prospects import ENTRY_FEATURES, Units, describe_entries, describe_standing
+from wsn_env.envs.prospects import Units, describe_entries, describe_standing, entry_features
 from wsn_env.models.measurement.base import Order
 from wsn_env.models.quantity import suggest
 from wsn_env.models.state import knowledge_at
@@ -30,8 +30,6 @@ from wsn_env.scenario.constants import common_constants
 from wsn_env.simulation.view import View
 
 ObservationName = Literal["candidates", "menu", "dict", "view"]
-
-G = len(BELIEF_FEATURES)
 
 
 class Observation(Protocol):
@@ -49,8 +47,8 @@ class Observation(Protocol):
 
 
 @kernel
-def _encode_candidates(start, stop, cs, handle, battery_j, found, out):
-    """Fill out (B, n): BELIEF_FEATURES, then CANDIDATE_FEATURES of each candidate. Only in the rows marked.
+def _encode_candidates(start, stop, cs, handle, terms, found, out):
+    """Fill out (B, n): `belief_features`, then CANDIDATE_FEATURES of each candidate. Only in the rows marked.
 
     Args:
         cs: the scenario's common constants.
@@ -60,34 +58,34 @@ def _encode_candidates(start, stop, cs, handle, battery_j, found, out):
     known, ranking = knowledge_at(handle), np.empty(found[1], RANKED)
     for b in range(start, stop):
         if found[0][b]:
-            _encode_candidates_of(b, cs[0], known, battery_j, found, ranking, out)
+            _encode_candidates_of(b, cs[0], known, found, ranking, out)
 
 
 @lean_piece
-def _encode_candidates_of(b, c, known, battery_j, found, ranking, out):
+def _encode_candidates_of(b, c, known, found, ranking, out):
     _, candidates, table = found
     f, outlook = out[b], outlook_of(known, b, candidates, table)
-    heading = describe_belief(outlook, known.row[b], known.reports.count[b], c.radius_m, f[:G])
-    f[G:] = 0.0
+    heading, first = describe_row(known, b, outlook, c, f)
+    own = f[first:]
+    own[:] = 0.0
     for k in range(candidates):
-        node, g = outlook.nodes[k].node, f[G + k * features.WIDTH : G + (k + 1) * features.WIDTH]
-        if node < 0:
+        g = own[k * features.WIDTH : (k + 1) * features.WIDTH]
+        if outlook.nodes[k].node < 0:
             g[2] = BOUND
         else:
             describe_candidate(outlook, k, heading, c.radius_m, g)
-            g[7] = known.network.battery[b, node] / battery_j
     standing = outlook.nodes[candidates].node >= 0
     order_row(outlook, candidates if standing else -1, 0.0, c, ranking)
-    describe_merit(outlook, ranking, f[G:])
+    describe_merit(outlook, ranking, own)
     clip(f)
 
 
 @kernel
 def _encode_menu(start, stop, cs, handle, terms, found, out):
-    """Fill out (B, n): BELIEF_FEATURES, then ENTRY_FEATURES of each of the menu's entries. Only in the rows marked.
+    """Fill out (B, n): `belief_features`, then `entry_features` of each of the menu's entries. Only in the rows marked.
 
     Args:
-        terms: the scenario's typical energy [mJ], the place in ORDERS, its typical cost in each row (B,) [m].
+        terms: the place in ORDERS, the scenario's typical cost in each row (B,) [m].
         found: as for `_encode_candidates`, to the depth REPORTS_AHEAD.
         The rest: as `_encode_candidates`.
     """
@@ -99,31 +97,35 @@ def _encode_menu(start, stop, cs, handle, terms, found, out):
 
 @lean_piece
 def _encode_menu_of(b, c, known, terms, found, ranking, out):
-    (typical_mj, by, costs), (_, candidates, table) = terms, found
-    group = GROUP * prospects.WIDTH
-    f, outlook, units = out[b], outlook_of(known, b, candidates, table), Units(costs[b], typical_mj)
-    heading = describe_belief(outlook, known.row[b], known.reports.count[b], c.radius_m, f[:G])
-    first = G + prospects.WIDTH
-    describe_standing(outlook, heading, units, c, f[G:first])
+    (by, costs), (_, candidates, table) = terms, found
+    f, outlook, units = out[b], outlook_of(known, b, candidates, table), Units(costs[b], c.typical_energy_mj)
+    heading, first = describe_row(known, b, outlook, c, f)
+    width = (len(f) - first) // MENU_ENTRIES
+    describe_standing(outlook, heading, units, c, f[first : first + width])
     for rule in range(3):
         leader = rank_row(by, rule, outlook, c, ranking)
-        entries = f[first + rule * group : first + (rule + 1) * group]
-        describe_entries(outlook, ranking, leader, heading, units, c, entries)
+        begin = first + (1 + rule * GROUP) * width
+        describe_entries(outlook, ranking, leader, heading, units, c, f[begin : begin + GROUP * width])
     clip(f)
 
 
 class CandidatesObservation:
-    """Flat Box float32: BELIEF_FEATURES, then CANDIDATE_FEATURES of the K living nodes nearest to the prediction."""
+    """Flat Box float32: `belief_features`, then CANDIDATE_FEATURES of the K living nodes nearest to the prediction."""
 
-    features: tuple[str, ...] = CANDIDATE_FEATURES
     depth, kernel = REPORTS, _encode_candidates
 
     def __init__(self, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> None:
-        self.shape: tuple[int, int] = (candidates, len(self.features))
-        self.space: spaces.Box = spaces.Box(-BOUND, BOUND, (G + candidates * self.shape[1],), np.float32)
+        self.belief: int = len(belief_features(scenario))
+        self.shape: tuple[int, int] = self._shape(scenario, candidates)
+        size = self.belief + self.shape[0] * self.shape[1]
+        self.space: spaces.Box = spaces.Box(-BOUND, BOUND, (size,), np.float32)
         self._candidates, self._threads, self._scenario = candidates, threads, scenario
         self._expectations, self._constants = Expectations(scenario, candidates, threads), common_constants(scenario)
         self._encode = Pinned(self.kernel)
+
+    @staticmethod
+    def _shape(scenario: Scenario, candidates: int) -> tuple[int, int]:
+        return candidates, len(CANDIDATE_FEATURES)
 
     def encode(self, view: View) -> np.ndarray:
         """(B, n) float32, fresh."""
@@ -146,34 +148,35 @@ class CandidatesObservation:
         return out
 
     def _terms(self, view: View) -> Any:
-        return self._scenario.radio.battery_j
+        return ()
 
 
 class MenuObservation(CandidatesObservation):
-    """Flat Box float32: BELIEF_FEATURES, then ENTRY_FEATURES of each entry of the menu: its predicted outcome."""
+    """Flat Box float32: `belief_features`, then `entry_features` of each entry of the menu: its predicted outcome."""
 
-    features: tuple[str, ...] = ENTRY_FEATURES
     depth, kernel = REPORTS_AHEAD, _encode_menu
 
     def __init__(self, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> None:
         super().__init__(scenario, order, candidates, threads)
-        self.shape: tuple[int, int] = (MENU_ENTRIES, len(self.features))
-        self.space: spaces.Box = spaces.Box(-BOUND, BOUND, (G + MENU_ENTRIES * self.shape[1],), np.float32)
         self._by = ORDERS.index(order)
 
+    @staticmethod
+    def _shape(scenario: Scenario, candidates: int) -> tuple[int, int]:
+        return MENU_ENTRIES, len(entry_features(scenario))
+
     def _terms(self, view: View) -> Any:
-        return self._scenario.typical_energy_mj, self._by, self._scenario.typical_cost(view.lam)
+        return self._by, self._scenario.typical_cost(view.lam)
 
 
 class DictObservation:
-    """The same features under names: belief (19,), candidates (K, 11), and lam (1,) [m/mJ]."""
+    """The same features under names: belief (n,), candidates (K, 11), and lam (1,) [m/mJ]."""
 
     def __init__(self, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> None:
         self._flat = CandidatesObservation(scenario, order, candidates, threads)
         high = max(scenario.lam_range[1], 1.0)
         self.space: Any = spaces.Dict(
             {
-                "belief": spaces.Box(-BOUND, BOUND, (G,), np.float32),
+                "belief": spaces.Box(-BOUND, BOUND, (self._flat.belief,), np.float32),
                 "candidates": spaces.Box(-BOUND, BOUND, self._flat.shape, np.float32),
                 "lam": spaces.Box(0.0, high, (1,), np.float32),
             }
@@ -183,8 +186,8 @@ class DictObservation:
         """A dict of (B, ...) float32, fresh."""
         flat = self._flat.encode(view)
         return {
-            "belief": flat[:, :G].copy(),
-            "candidates": flat[:, G:].reshape(len(flat), *self._flat.shape).copy(),
+            "belief": flat[:, : self._flat.belief].copy(),
+            "candidates": flat[:, self._flat.belief :].reshape(len(flat), *self._flat.shape).copy(),
             "lam": np.minimum(view.lam[:, None].astype(np.float32), self.space["lam"].high[0]),
         }
 
@@ -213,7 +216,9 @@ class ViewObservation:
                 "predicted_mean": box(-far, far, 4),
                 "predicted_cov": box(-far, far, 4, 4),
                 "positions": box(0.0, side, nodes, 2),
-                "battery": box(0.0, scenario.radio.battery_j, nodes),
+                "full_j": box(0.0, scenario.radio.most_battery_j, 1),
+                "left_j": box(0.0, 1.000001 * nodes * scenario.radio.most_battery_j, 1),  # a sum: rounded
+                "battery": box(0.0, scenario.radio.most_battery_j, nodes),
                 "head": spaces.Box(-1, nodes - 1, (1,), np.int64),  # -1: none (learners want Discrete from 0)
                 "member": spaces.Box(0, 1, (nodes,), np.int8),
                 "detected": spaces.Box(0, 1, (nodes,), np.int8),

@@ -10,6 +10,7 @@ from wsn_env.envs.expectations import Outlook
 from wsn_env.envs.features import Heading
 from wsn_env.envs.merit import PositionCov, gain, position_cov, report_way, squared_between
 from wsn_env.models.radio.base import reception, transmission
+from wsn_env.scenario import Scenario
 
 ENTRY_FEATURES = (
     "standing",  # 1: the cluster as it is
@@ -29,7 +30,16 @@ ENTRY_FEATURES = (
     "head_distance",
     "head_detection",
 )
+ENERGY_FEATURES = (  # behind them, where energy is scarce
+    "head_energy",  # share of its battery
+    "least_energy",  # of the battery of the node that has least
+)
 WIDTH = len(ENTRY_FEATURES)
+
+
+def entry_features(scenario: Scenario) -> tuple[str, ...]:
+    """What observations tell of an entry of the menu."""
+    return ENTRY_FEATURES + (ENERGY_FEATURES if scenario.scarce_energy else ())
 
 
 class Units(NamedTuple):
@@ -47,6 +57,7 @@ class Tally(NamedTuple):
     detections: float  # expected
     silence: float  # probability that no report comes
     missed_ahead: float  # probability that none detects AHEAD periods on
+    least_left: float  # share of the battery of the node that has least
 
 
 @lean_piece
@@ -86,8 +97,9 @@ def describe_entries(
         head = nodes[leader].node
         tally = _with_head(tally, outlook, leader, c.radio)
     slot, invited = 0, 0
-    for n in range(len(entries) // WIDTH):
-        f = entries[n * WIDTH : (n + 1) * WIDTH]
+    width = WIDTH + (len(ENERGY_FEATURES) if c.scarce_energy else 0)
+    for n in range(len(entries) // width):
+        f = entries[n * width : (n + 1) * width]
         f[:] = 0.0
         if n > 0 and head >= 0:
             while slot < len(ranking) and (ranking[slot].place < 0 or nodes[ranking[slot].place].node == head):
@@ -116,7 +128,7 @@ def stands(outlook: Outlook, node: int) -> bool:
 
 @lean_piece
 def _nobody(outlook):
-    return Tally(position_cov(outlook.cov), 0.0, 0.0, 1.0, 1.0)
+    return Tally(position_cov(outlook.cov), 0.0, 0.0, 1.0, 1.0, 1.0)
 
 
 @lean_piece
@@ -128,6 +140,7 @@ def _counted(tally, node, arrival, joules):
         tally.detections + node.detection,
         tally.silence * (1.0 - node.detection * arrival),
         tally.missed_ahead * (1.0 - node.detection_ahead),
+        min(tally.least_left, node.left),
     )
 
 
@@ -174,6 +187,8 @@ def _write_head(outlook, leader, heading, radius_m, f):
     f[13] = dy * heading.x - dx * heading.y
     f[14] = np.sqrt(dx * dx + dy * dy)
     f[15] = head.detection
+    if len(f) > WIDTH:
+        f[WIDTH] = head.left
 
 
 @lean_piece
@@ -190,3 +205,5 @@ def _write(n, invited, tally, outlook, units, f):
     f[9] = 0.25 * tally.detections
     f[10] = tally.silence
     f[11] = 1.0 - tally.missed_ahead
+    if len(f) > WIDTH:
+        f[WIDTH + 1] = tally.least_left

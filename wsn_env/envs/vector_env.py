@@ -24,6 +24,7 @@ from wsn_env.models.quantity import whole_number
 from wsn_env.models.state import State
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.quantities import Quantities
+from wsn_env.simulation.lifetime import lifetimes
 from wsn_env.simulation.reference import Reference, has_reference
 from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World
@@ -183,6 +184,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         played = np.maximum(self._state.period, 1)
         scored = np.maximum(played - self.scenario.unscored, 1)
         info = {"episode_rms_m": np.sqrt(self._squares / scored), "antnp": self._detections / played}
+        info |= lifetimes(self._state, self.scenario.periods)
         if self.scenario.ends_outside:
             info["reward_rest"] = self._charge_rest(0.0, rows)[1]
         if self._reference is not None:

@@ -29,14 +29,16 @@ from wsn_env.evaluation.versions import versions
 from wsn_env.models.arguments import checked, checked_but
 from wsn_env.models.quantity import NUMBERS, short, suggest
 from wsn_env.scenario import Scenario
+from wsn_env.simulation.lifetime import METRICS
 from wsn_env.simulation.reference import has_reference
 
 COLUMNS = (
     "policy scenario lam episode seed periods return error_m rms_m energy_mj members handovers searches lost"
+    " first_death half_dead functional tracked stranded_mj stranded_sd"
     " reference_m reference_all_awake_m anees variance_ratio"
 ).split()
 Row = dict[str, str | float]  # of the columns in COLUMNS
-MEANS = ("return", "rms_m", "error_m", "energy_mj", "members", "handovers", "searches", "lost")
+MEANS = ("return", "rms_m", "error_m", "energy_mj", "members", "handovers", "searches", "lost", *METRICS)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from wsn_env.evaluation.policies import Policy
 from wsn_env.models.quantity import whole_number
 from wsn_env.models.state import NOBODY, Cluster, Outcome, State
 from wsn_env.scenario import Scenario
+from wsn_env.simulation.lifetime import METRICS, lifetimes
 from wsn_env.simulation.reference import Reference, has_reference
 from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World
@@ -73,6 +74,9 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
     1 where the filter is honest, more where it is too sure. `variance_ratio` is the mean of e' e / trace(P), which one
     thin direction of P cannot dominate. Both leave out the unscored periods, as `rms_m` does. Of an episode that ends
     outside the field all means are over the periods played, and the sums hold the charge for those left.
+
+    `error_m` is the mean of errors as they count (`Scenario.counted_m`), `rms_m` of errors as they are. How long the
+    network lasted is told by `lifetimes`.
     """
     scenario = world.scenario
     names = "error", "square", "energy", "members", "handovers", "searches", "lost"
@@ -82,10 +86,11 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
     reference = Reference(scenario, len(seeds), world.threads) if has_reference(scenario) else None
     begin = None if reference is None else lambda state, _: reference.begin(state)
     playing, played = np.ones(len(seeds), bool), np.zeros(len(seeds), int)
+    lives: dict[str, np.ndarray] = dict.fromkeys(METRICS, np.zeros(len(seeds)))
     for state, outcome in episodes(policy, world, seeds, begin):
         square, believed = outcome.error_m**2, outcome.posterior_rms_m**2
         played += playing
-        sums["error"] += playing * outcome.error_m
+        sums["error"] += playing * scenario.counted_m(outcome.error_m)
         if state.period[0] > scenario.unscored:
             sums["square"] += playing * square
             nees, regular = _position_nees(state, outcome)
@@ -98,7 +103,11 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
         sums["handovers"] += playing & outcome.handover
         sums["searches"] += playing & outcome.searched
         sums["lost"] += playing & (outcome.error_m > 2 * scenario.radius_m)
-        playing &= ~world.left(state)
+        left_now = playing & world.left(state)
+        if left_now.any() or state.period[0] == scenario.periods:  # episodes that end
+            for name, values in lifetimes(state, scenario.periods).items():
+                lives[name] = np.where(playing, values, lives[name])
+        playing &= ~left_now
         if reference is not None:
             reference.advance(state, outcome)
     left = scenario.periods - played
@@ -119,6 +128,7 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
         "handovers": sums["handovers"].astype(int),
         "searches": sums["searches"].astype(int),
         "lost": sums["lost"].astype(int),
+        **lives,
         "reference_m": np.full(len(seeds), "") if reference is None else reference.episode_m(),
         "reference_all_awake_m": np.full(len(seeds), "") if reference is None else reference.all_awake_m(state),
         "anees": nees_sums / np.maximum(regular_periods, 1),

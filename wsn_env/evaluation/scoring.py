@@ -39,11 +39,11 @@ def score(act: Callable[[Any], Any], envs: VectorEnv, seed: int = 0) -> np.ndarr
         )
     seeds: Any = evaluation_seeds(seed, envs.num_envs)  # the native environment takes a seed for each row
     observations, _ = envs.reset(seed=seeds)
-    lam, periods = unwrap_native(envs).lam.copy(), unwrap_native(envs).scenario.periods
+    lam, scenario = unwrap_native(envs).lam.copy(), unwrap_native(envs).scenario
     errors, energies = np.zeros((2, envs.num_envs))
-    for _ in range(periods):
+    for _ in range(scenario.periods):
         observations, _, _, _, info = envs.step(act(observations))
         info = info.get("final_info", info)  # same-step mode has begun the next episodes by now
-        errors += info["error_m"]
+        errors += scenario.counted_m(info["error_m"])
         energies += info["energy_mj"]
     return -(errors + lam * energies)

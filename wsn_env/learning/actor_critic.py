@@ -10,8 +10,6 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.type_aliases import Schedule
 from torch import nn
 
-from wsn_env.envs.features import BELIEF_FEATURES, CANDIDATE_FEATURES
-from wsn_env.envs.prospects import ENTRY_FEATURES
 from wsn_env.learning.network import EntryNetwork, FlatNetwork, PolicyNetwork
 
 
@@ -89,13 +87,13 @@ def entry_sizes(
 
     Args:
         action: what is chosen from.
-        observation: the space of one environment's observations.
+        observation: the interface's, "menu" or "candidates".
         actor, critic: units of the two hidden layers.
     """
     return dict(
-        belief=len(BELIEF_FEATURES),
-        entry=len(ENTRY_FEATURES if action == "menu" else CANDIDATE_FEATURES),
-        observation=observation.shape[0],
+        belief=observation.belief,
+        entry=observation.shape[1],
+        observation=observation.space.shape[0],
         outputs=1 if action == "menu" else 2,
         actor=actor,
         critic=critic,

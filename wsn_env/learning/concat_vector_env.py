@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from wsn_env.envs.interface import check_options
+from wsn_env.envs.interface import Interface, check_options
 from wsn_env.envs.vector_env import row_seeds
 from wsn_env.evaluation.native_envs import unwrap_native
 from wsn_env.models.arguments import checked
@@ -36,6 +36,7 @@ class ConcatVectorEnv(gym.vector.VectorEnv):
                     )
             if unwrap_native(part).autoreset_mode != unwrap_native(first).autoreset_mode:
                 raise ValueError("ConcatVectorEnv: the parts' autoreset modes differ")
+        self.interface: Interface = unwrap_native(first).interface  # that of all
         self.parts: list[gym.vector.VectorEnv] = list(parts)
         ends = np.cumsum([0] + [part.num_envs for part in parts])
         self._rows = [slice(start, stop) for start, stop in zip(ends, ends[1:])]

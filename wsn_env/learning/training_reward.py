@@ -53,6 +53,6 @@ class TrainingReward(gym.vector.VectorWrapper):
         """(B,) true over believed errors, after those of this period. Rows that only begin have neither."""
         width = np.log2(np.maximum(info["posterior_rms_m"] / scenario.typical_error_m, 1e-9))
         nearest = abs(WIDTHS[:, None] - width).argmin(axis=0)
-        for sums, errors in zip(self.errors, (info["error_m"], -info["reward_error"])):
+        for sums, errors in zip(self.errors, (scenario.counted_m(info["error_m"]), -info["reward_error"])):
             sums += np.bincount(nearest, errors, len(WIDTHS))
         return np.interp(width, WIDTHS, self.errors[0] / self.errors[1])

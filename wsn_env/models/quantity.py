@@ -47,6 +47,7 @@ def check_quantity(  # noqa: PLR0913
     whole: bool = False,
     choices: tuple[Any, ...] | None = None,
     optional: bool = False,
+    drawn: bool = False,
 ) -> None:
     """Raise ScenarioError unless `value` is allowed for the field `name` of `owner`.
 
@@ -55,6 +56,7 @@ def check_quantity(  # noqa: PLR0913
         whole: whole numbers only.
         choices: these values only.
         optional: None too.
+        drawn: also a pair (low, high) of them, between which it is drawn log-uniformly for each episode.
     """
     if value is None and optional:
         return
@@ -62,22 +64,30 @@ def check_quantity(  # noqa: PLR0913
         if value not in choices:
             raise ScenarioError(f"{owner}.{name} = {value!r:.80}: allowed are {', '.join(map(str, choices))}")
         return
-    good = (
-        isinstance(value, NUMBERS)
-        and not isinstance(value, bool)
-        and abs(value) < math.inf
-        and (not whole or value == int(value))
-        and (above is None or value > above)
-        and (at_least is None or value >= at_least)
-        and (at_most is None or value <= at_most)
-        and (below is None or value < below)
-    )
+
+    def fits(number: Any) -> bool:
+        return (
+            isinstance(number, NUMBERS)
+            and not isinstance(number, bool)
+            and abs(number) < math.inf
+            and (not whole or number == int(number))
+            and (above is None or number > above)
+            and (at_least is None or number >= at_least)
+            and (at_most is None or number <= at_most)
+            and (below is None or number < below)
+        )
+
+    if drawn and isinstance(value, (tuple, list)):
+        good = len(value) == 2 and all(map(fits, value)) and value[0] <= value[1] and (value[0] == 0) == (value[1] == 0)
+    else:
+        good = fits(value)
     if not good:
         bounds = (("above", above), ("at least", at_least), ("at most", at_most), ("below", below))
         given = [(words, bound) for words, bound in bounds if bound is not None]
         rules = " and ".join(f"{words} {bound if isinstance(bound, int) else f'{bound:g}'}" for words, bound in given)
-        kind = "a whole number" if whole else "a finite number"
-        raise ScenarioError(f"{owner}.{name} = {value!r:.80}: must be {kind} {rules}".rstrip())
+        kind = f"{'a whole' if whole else 'a finite'} number {rules}".rstrip()
+        pair = ", or a pair of such, 0 < low <= high" if drawn else ""
+        raise ScenarioError(f"{owner}.{name} = {value!r:.80}: must be {kind}{pair}")
 
 
 def whole_number(name: str, value: Any, least: int, most: int | None = None) -> int:
@@ -108,13 +118,21 @@ class Section:
 
     def __post_init__(self) -> None:
         for item in fields(self):
-            object.__setattr__(self, item.name, plain(getattr(self, item.name)))
-            if "allowed" in item.metadata:
-                value, allowed = getattr(self, item.name), item.metadata["allowed"]
+            value, allowed = plain(getattr(self, item.name)), item.metadata.get("allowed")
+            if allowed is not None:
+                if allowed.get("drawn") and isinstance(value, (np.ndarray, list)):
+                    value = tuple(plain(list(value)))
                 check_quantity(type(self).__name__, item.name, value, **allowed)
                 if value is not None and "choices" not in allowed:
                     # 10 is 10.0: kernels are compiled for the types of constants.
-                    object.__setattr__(self, item.name, (int if allowed.get("whole") else float)(value))
+                    number = int if allowed.get("whole") else float
+                    value = tuple(map(number, value)) if isinstance(value, tuple) else number(value)
+            object.__setattr__(self, item.name, value)
+
+
+def span(value: float | tuple[float, float]) -> tuple[float, float]:
+    """(lowest, highest) of a quantity that may be drawn for each episode."""
+    return value if isinstance(value, tuple) else (value, value)
 
 
 def short(text: str, most: int = 80) -> str:
@@ -136,7 +154,7 @@ def suggest(name: str, known: Iterable[object]) -> str:
 
 
 def parse_overrides(pairs: Iterable[str]) -> dict[str, Any]:
-    """{"nodes": 400} from ["nodes=400"]; values are numbers, true/false, none, or words."""
+    """{"nodes": 400} from ["nodes=400"]; values are numbers, pairs of them (low..high), true/false, none, or words."""
     overrides: dict[str, Any] = {}
     for pair in pairs:
         name, equals, text = pair.partition("=")
@@ -145,9 +163,10 @@ def parse_overrides(pairs: Iterable[str]) -> dict[str, Any]:
         words: dict[str, Any] = {"true": True, "false": False, "none": None}
         value: Any = words.get(text.lower(), text)
         if value is text:
+            low, pair, high = text.partition("..")
             for kind in (int, float):
                 try:
-                    value = kind(text)
+                    value = (float(low), float(high)) if pair else kind(text)
                     break
                 except ValueError:
                     continue

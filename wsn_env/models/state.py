@@ -34,6 +34,7 @@ GRID = record([("x_m", "f8"), ("y_m", "f8"), ("cell_m", "f8"), ("side", "i8")])
 NETWORK = record(
     [
         ("alive", "i8"),  # nodes taken for alive
+        ("left_j", "f8"),  # sum of their batteries
         ("head", "i8"),  # -1: none
         ("n_members", "i8"),
     ]
@@ -43,11 +44,24 @@ STATE = record(
     [
         ("period", "i8"),  # periods done
         ("lam", "f8"),  # m/mJ
+        ("full_j", "f8"),  # a full battery: a node's energy at the start
         ("log_miss", "f8"),  # log probability of having missed the target ever since the last report
         ("last_search", "i8"),  # period of the last search
         ("random_bits", "u4"),  # a random 32-bit number of the period, for policies that want one
     ]
 )
+
+
+LIFE = record(
+    [
+        ("first_death", "i8"),  # period in which a node had died for the first time; 0: not yet
+        ("half_dead", "i8"),  # in which half of them had
+        ("functional", "i8"),  # in which the mean error of the last WINDOW periods exceeded a sensing radius
+        ("tracked", "i8"),  # periods whose error was at most a sensing radius
+        ("window_m", "f8"),  # sum of the last WINDOW periods' errors, as they count
+    ]
+)
+WINDOW = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,6 +148,8 @@ class State(Arrays):
     sensed: np.ndarray = array(np.int8, "rows", "states")  # what each node sensed last, known to itself alone
     residual_j: np.ndarray = array(float, "rows", "nodes")  # energy left in each node: it is alive while it has any
     living: np.ndarray = array(np.int64, "rows")  # how many are
+    life: np.ndarray = array(LIFE, "rows")  # how the episode has gone so far
+    recent_m: np.ndarray = array(float, "rows", WINDOW)  # errors of the last periods, as they count
     ledger: Ledger = part(Ledger)
     row: np.ndarray = array(STATE, "rows")  # what the network knows beside the following
     network: Network = part(Network)

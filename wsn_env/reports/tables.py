@@ -16,12 +16,23 @@ if TYPE_CHECKING:
 
 OVER_REFERENCE = "RMS / reference"
 HEADER = ("policy", "return", "{} - policy", "RMS m", OVER_REFERENCE, "energy mJ/period", "awake", "lost")
+CAPPED = "capped error m"
+LIFETIME = ("first death", "half dead", "functional", "tracked %", "left mJ")
 
 
 def table_header(evaluation: Evaluation, reference: str) -> list[str]:
     """Names of the columns of `table_rows`."""
     names = [name.format(reference) for name in HEADER]
-    return names if has_reference(evaluation.scenario) else [name for name in names if name != OVER_REFERENCE]
+    if not has_reference(evaluation.scenario):
+        names.remove(OVER_REFERENCE)
+    if evaluation.scenario.error_cap_m is not None:
+        names.insert(names.index("RMS m"), CAPPED)
+    return [*names, *(LIFETIME if nodes_die(evaluation) else ())]
+
+
+def nodes_die(evaluation: Evaluation) -> bool:
+    """Whether a battery ran empty in any of the episodes, so that lifetimes tell something."""
+    return any(float(row["first_death"]) < evaluation.scenario.periods for row in evaluation.rows)
 
 
 def describe_reference(evaluation: Evaluation) -> str:
@@ -35,7 +46,7 @@ def describe_reference(evaluation: Evaluation) -> str:
 
 def table_rows(evaluation: Evaluation, lam: float, reference: str) -> list[tuple[str, ...]]:
     """Best return first; means with 95 % intervals, and the paired difference of the reference's return minus each."""
-    rows = []
+    rows, cap, dying = [], evaluation.scenario.error_cap_m, nodes_die(evaluation)
     for policy in evaluation.policies:
         s = evaluation.summary(policy, lam)
         ratio = evaluation.rms_over_reference(policy, lam)
@@ -49,15 +60,24 @@ def table_rows(evaluation: Evaluation, lam: float, reference: str) -> list[tuple
                     policy,
                     format_interval(s["return"], 1),
                     difference,
+                    *([] if cap is None else [format_interval(s["error_m"], 3)]),
                     format_interval(s["rms_m"], 3),
                     *([] if ratio is None else [format_interval(ratio, 2)]),
                     format_interval(s["energy_mj"], 4),
                     f"{s['members'].mean:.1f}",
                     f"{s['lost'].mean:.2f}",
+                    *(_lifetime(s) if dying else ()),
                 ),
             )
         )
     return [row for _, row in sorted(rows, key=lambda pair: -pair[0])]
+
+
+def _lifetime(s: dict[str, Summary]) -> list[str]:
+    """The columns of LIFETIME."""
+    periods = [f"{s[name].mean:.0f}" for name in ("first_death", "half_dead")]
+    left = f"{s['stranded_mj'].mean:.3g}"
+    return [*periods, format_interval(s["functional"], 0), f"{100 * s['tracked'].mean:.1f}", left]
 
 
 def format_interval(value: Summary, digits: int, sign: str = "") -> str:

@@ -20,6 +20,7 @@ TRACKING = record(
         ("side_m", "f8"),
         ("depth_m", "f8"),
         ("radius_m", "f8"),
+        ("error_cap_m", "f8"),  # inf: none
         ("q", "f8"),
         ("walks", "i8"),
         ("velocity_kept", "f8"),  # of a walker's, from period to period
@@ -65,9 +66,19 @@ def _zeros(members):
 
 def _common_constants(scenario):
     radio = constants_type(scenario.radio, scenario)
-    made = _zeros([("radio", radio), ("radius_m", "f8"), ("equal_everywhere", "i8")])
+    numbers = {
+        "radius_m": scenario.radius_m,
+        "period_s": scenario.period_s,
+        "periods": float(scenario.periods),
+        "typical_energy_mj": scenario.typical_energy_mj,
+    }
+    plain = [(name, "f8") for name in numbers]
+    made = _zeros([("radio", radio), ("equal_everywhere", "i8"), ("scarce_energy", "i8"), *plain])
     fill_constants(made["radio"], scenario.radio, scenario)
-    made["radius_m"], made["equal_everywhere"] = scenario.radius_m, scenario.measurement.equal_everywhere
+    made["equal_everywhere"] = scenario.measurement.equal_everywhere
+    made["scarce_energy"] = scenario.scarce_energy
+    for name, value in numbers.items():
+        made[name] = value
     return made
 
 
@@ -89,6 +100,7 @@ def _constants(scenario: Scenario) -> np.ndarray:
         side_m=side_m,
         depth_m=depth_m,
         radius_m=scenario.radius_m,
+        error_cap_m=math.inf if scenario.error_cap_m is None else scenario.error_cap_m,
         q=scenario.filter_q,
         walks=walks,
         velocity_kept=1.0 if t.velocity_s is None else math.exp(-scenario.period_s / t.velocity_s),

@@ -27,6 +27,8 @@ class Quantities(TypedDict, total=False):
     lam: float | tuple[float, float]
     typical_error_m: float
     typical_energy_mj: float
+    error_cap_m: float | None
+    scarce_energy: bool
     unscored: int
     ends_outside: bool
     reference_error_m: float
@@ -119,7 +121,7 @@ class Quantities(TypedDict, total=False):
     packet_success: float
     retries: int
     receiver: Literal["head", "sink", "target"]
-    battery_j: float
+    battery_j: float | tuple[float, float]
     transmit_w: float
     listen_w: float
     bit_rate: float

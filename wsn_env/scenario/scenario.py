@@ -21,14 +21,13 @@ from wsn_env.models.motion.base import Motion
 from wsn_env.models.motion.crossing import Crossing
 from wsn_env.models.own import kind_and_settings
 from wsn_env.models.quantity import (
-    NUMBERS,
     ScenarioError,
     Section,
     UnknownQuantity,
     is_line,
-    plain,
     quantity,
     short,
+    span,
     suggest,
 )
 from wsn_env.models.radio.base import Link
@@ -64,11 +63,23 @@ class Scenario(Section):
     name: str = "PreDC-v0"
     periods: int = quantity(100, "horizon of an episode", at_least=1, at_most=10**7, whole=True)
     period_s: float = quantity(1.0, "sampling period T", at_least=1e-6, at_most=3600)
-    lam: float | tuple[float, float] = 4.0  # m/mJ; a pair (low, high): drawn log-uniformly for each episode
+    lam: float | tuple[float, float] = quantity(
+        4.0, "what a mJ may cost of error [m/mJ]", at_least=0, at_most=MOST_LAM, drawn=True
+    )
     typical_error_m: float = quantity(
         1.0, "error of a good schedule: the scale of a learner's rewards", at_least=1e-9, at_most=1e9
     )
     typical_energy_mj: float = quantity(0.3, "its energy in a period", at_least=1e-9, at_most=1e9)
+    error_cap_m: float | None = quantity(
+        None,
+        "an error counts as this at most, so that a lost target costs no more the farther it goes; None: as it is",
+        above=0,
+        at_most=1e9,
+        optional=True,
+    )
+    scarce_energy: bool = quantity(
+        False, "observations also tell what is left of energy and time", choices=(True, False)
+    )
     unscored: int = quantity(0, "periods at the start that rms_m leaves out: acquisition", at_least=0, whole=True)
     ends_outside: bool = quantity(
         False,
@@ -91,8 +102,6 @@ class Scenario(Section):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if isinstance(self.lam, np.ndarray):
-            object.__setattr__(self, "lam", plain(tuple(self.lam)) if self.lam.ndim else self.lam.item())
         for name, part in PARTS.items():
             value = getattr(self, name)
             if not isinstance(value, part):
@@ -106,11 +115,6 @@ class Scenario(Section):
         if self.ends_outside and self.unscored:
             raise ScenarioError(f"Scenario.unscored = {self.unscored}: must be 0 with ends_outside = True")
         self._check_tracker()
-        low, high = self.lam_range
-        if not (np.isfinite([low, high]).all() and 0 <= low <= high <= MOST_LAM) or (low == 0) != (high == 0):
-            raise ScenarioError(
-                f"Scenario.lam = {self.lam!r}: must be at least 0 m/mJ, or a pair 0 < low <= high, up to {MOST_LAM:g}"
-            )
         for kind in (self.detection, self.measurement, self.radio):
             kind.check(self)
         self.motion.check_measurement(self.measurement)
@@ -145,10 +149,15 @@ class Scenario(Section):
     @property
     def lam_range(self) -> tuple[float, float]:
         """(lowest, highest) lam of an episode [m/mJ]."""
-        pair = tuple(self.lam) if isinstance(self.lam, (tuple, list)) else (self.lam, self.lam)
-        if len(pair) != 2 or any(isinstance(x, bool) or not isinstance(x, NUMBERS) for x in pair):
-            raise ScenarioError(f"Scenario.lam = {self.lam!r}: must be a number of m/mJ or a pair of them")
-        return float(pair[0]), float(pair[1])
+        return span(self.lam)
+
+    def counted_m(self, error_m: Any) -> Any:
+        """Errors as they count in rewards and returns: at most `error_cap_m`.
+
+        Args:
+            error_m: (...,) m.
+        """
+        return error_m if self.error_cap_m is None else np.minimum(error_m, self.error_cap_m)
 
     @property
     def lam_balance(self) -> float:

@@ -9,9 +9,11 @@ from wsn_env.compiled.kernels import kernel, over_rows, piece
 from wsn_env.models.field import lay_out, scatter
 from wsn_env.models.kinds import constants_type, fill_constants
 from wsn_env.models.motion.base import Course, draw, reflect
+from wsn_env.models.quantity import span
 from wsn_env.models.state import state_at
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.geometry import index_nodes
+from wsn_env.simulation.lifetime import clear_life
 from wsn_env.simulation.messages import clear_ledger
 
 START = record(
@@ -20,9 +22,8 @@ START = record(
         ("searches", "i8"),  # 1: a search in period 0
         ("sd_m", "f8"),
         ("sd_ms", "f8"),
-        ("battery", "f8"),
-        ("low", "f8"),
-        ("high", "f8"),
+        ("battery_j", "f8", 2),  # lowest and highest, between which an episode's is drawn
+        ("lam", "f8", 2),
         ("seeded", "i8"),
         ("field_key", "u8"),
         ("grid", "i8"),
@@ -41,10 +42,9 @@ def start_record(scenario: Scenario) -> np.ndarray:
     made["known"], made["searches"] = known, scenario.tracking.start == "search"
     made["sd_m"] = scenario.tracking.start_sd_m if known else scenario.field.side_m / 12**0.5
     made["sd_ms"] = scenario.tracking.start_sd_ms if known else scenario.tracking.rest_sd_ms
-    made["battery"] = scenario.radio.battery_j
+    made["battery_j"], made["lam"] = span(scenario.radio.battery_j), scenario.lam_range
     made["side_m"], made["depth_m"] = scenario.field.room_m
     made["search_gap"] = scenario.tracking.search_gap
-    made["low"], made["high"] = scenario.lam_range
     made["grid"], made["jitter"] = scenario.field.layout == "grid", scenario.field.jitter
     if scenario.field.field_seed is not None:
         made["seeded"] = 1
@@ -79,9 +79,8 @@ def begin(
         row.period = 0
         row.log_miss = 0.0
         row.last_search = -s.search_gap
-        row.lam = s.low
-        if s.high > s.low:
-            row.lam = s.low * exp(log(s.high / s.low) * draws.uniform(draws.stream(key, 0, draws.LAM), 0))
+        row.lam = _draw_between(s.lam, key, draws.LAM)
+        row.full_j = _draw_between(s.battery_j, key, draws.BATTERY)
         if len(placed) > 0:
             for i in range(len(placed)):
                 network.positions[b, i, 0], network.positions[b, i, 1] = placed[i, 0], placed[i, 1]
@@ -92,12 +91,14 @@ def begin(
             else:
                 scatter(field_stream, s.side_m, network.positions[b])
         index_nodes(network.positions[b], network.grid, b)
-        state.residual_j[b] = s.battery
+        state.residual_j[b] = row.full_j
         state.living[b] = network.battery.shape[1]
-        network.battery[b] = s.battery
+        network.battery[b] = row.full_j
         network.row[b].alive = network.battery.shape[1]
+        network.row[b].left_j = network.battery.shape[1] * row.full_j
         network.row[b].head = -1
         network.row[b].n_members = 0
+        clear_life(state, b)
         state.sensed[b] = 0
         state.reports.count[b] = 0
         state.reports.bitmap[b] = 0
@@ -105,6 +106,15 @@ def begin(
         _first_belief(draws.stream(key, 0, draws.START), state.track[b, 0], s, belief.mean, belief.cov)
         for axis in range(4):  # where a first search takes the target to be
             belief.predicted_mean[axis] = belief.mean[axis]
+
+
+@piece
+def _draw_between(span, key, purpose):
+    """Log-uniformly, by key."""
+    low, high = span[0], span[1]
+    if high > low:
+        return low * exp(log(high / low) * draws.uniform(draws.stream(key, 0, purpose), 0))
+    return low
 
 
 class Tracks:

@@ -67,7 +67,9 @@ def note_residual(node: Any, episode: Episode) -> None:
 @lean_piece
 def _note_battery(node, left_j, episode):
     network, b = episode.state.network, episode.b
-    network.row[b].alive -= network.battery[b, node] > 0.0 and left_j == 0.0
+    before = network.battery[b, node]
+    network.row[b].alive -= before > 0.0 and left_j == 0.0
+    network.row[b].left_j = max(network.row[b].left_j - (before - left_j), 0.0)  # a sum: rounded
     network.battery[b, node] = left_j
 
 

@@ -23,6 +23,7 @@ from wsn_env.models.motion.prediction import predict_moments, predict_walk
 from wsn_env.models.state import KEEP_CLUSTER, KEEP_HEAD, NOBODY, belief_at, state_at
 from wsn_env.simulation import messages
 from wsn_env.simulation.geometry import nearest_living
+from wsn_env.simulation.lifetime import count_life
 from wsn_env.simulation.messages import Episode
 
 
@@ -302,6 +303,7 @@ def _settle(episode, r, t):
     out.target_m[0], out.target_m[1] = target[0], target[1]
     out.estimate_m[0], out.estimate_m[1] = mean[0], mean[2]
     out.error_m = np.sqrt((mean[0] - target[0]) ** 2 + (mean[2] - target[1]) ** 2)
+    count_life(state, b, out.error_m, t)
     out.posterior_rms_m = np.sqrt(cov[0, 0] + cov[2, 2])
     out.believed_error_m = expected_error(cov[0, 0], cov[0, 2], cov[2, 2])
     out.n_eff = belief.n_eff

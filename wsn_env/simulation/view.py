@@ -6,7 +6,7 @@ to their period: whatever a policy does with them, and however long it keeps the
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -87,6 +87,11 @@ class View:
         return self.belief["cov"]
 
     @property
+    def full_j(self) -> np.ndarray:
+        """(B,) what each battery held at the start [J]."""
+        return self.row["full_j"]
+
+    @property
     def predicted_mean(self) -> np.ndarray:
         """(B, 4) for the period to come."""
         return self.belief["predicted_mean"]
@@ -102,6 +107,16 @@ class View:
         if not isinstance(state, State):
             check_argument("state", state, State)
         return cls(state.knowledge.copy().freeze())
+
+    def at_lam(self, lam: np.ndarray) -> View:
+        """The same knowledge with other trade-offs.
+
+        Args:
+            lam: (B,) m/mJ.
+        """
+        row = self.row.copy()
+        row["lam"] = lam
+        return View(replace(self.knowledge, row=_frozen(row)))
 
     @property
     def positions(self) -> np.ndarray:
@@ -196,6 +211,8 @@ class View:
             "lam": self.lam[:, None].copy(),
             "random_bits": self.random_bits[:, None].astype(np.int64),
             "log_miss": self.log_miss[:, None].copy(),
+            "full_j": self.full_j[:, None].copy(),
+            "left_j": self.network.row["left_j"][:, None].copy(),
             "mean": self.mean.copy(),
             "cov": self.cov.copy(),
             "predicted_mean": self.predicted_mean.copy(),
@@ -233,7 +250,7 @@ class View:
         side = Grid.side(nodes)
         of_kinds = {"states": nodes if "bitmap" in a else 0, "receivers": nodes if HEARING[0] in a else 0}
         known = Knowledge.zeros(rows=rows, nodes=nodes, cells=side * side + 1, **of_kinds)
-        for name in ("period", "lam", "random_bits", "log_miss"):
+        for name in ("period", "lam", "random_bits", "log_miss", "full_j"):
             known.row[name] = a[name].reshape(rows)
         for name in ("mean", "cov", "predicted_mean", "predicted_cov"):
             known.belief[name] = a[name]
@@ -246,6 +263,7 @@ class View:
         geometry.index(network)
         others, heads = a["member"].astype(bool), a["head"].reshape(rows)
         network.row["alive"], network.row["head"] = (a["battery"] > 0).sum(axis=1), heads
+        network.row["left_j"] = a["left_j"].reshape(rows)
         others[heads >= 0, heads[heads >= 0]] = False
         network.members[:], network.row["n_members"] = _lists(others)
 

@@ -106,7 +106,7 @@ def _flash(canvas: Canvas, plan: Plan) -> None:
 def _draw_nodes(canvas: Canvas, plan: Plan, scene: Scene) -> None:
     """Their inside is the paler the less energy they have left; the dead are crossed out."""
     positions, battery_j = scene.nodes, scene.state.residual_j[scene.row]
-    share = np.clip(battery_j / scene.scenario.radio.battery_j, 0.0, 1.0)
+    share = np.clip(battery_j / scene.state.full_j[scene.row], 0.0, 1.0)
     alive, radius = share > 0, _node_radius(plan, len(positions))
     canvas.discs(positions[alive], radius, FULL)
     if (share[alive] < 0.98).any() and radius > 1.5:

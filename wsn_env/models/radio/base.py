@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 
 from wsn_env.models.kinds import Kind, by_kind
-from wsn_env.models.quantity import quantity
+from wsn_env.models.quantity import quantity, span
 
 if TYPE_CHECKING:
     from wsn_env.scenario import Scenario
@@ -55,7 +55,9 @@ class Link(Kind):
         " node, which hears their beacons",
         choices=RECEIVERS,
     )
-    battery_j: float = quantity(1.0, "a node's energy at the start", above=0, at_most=MOST_J)
+    battery_j: float | tuple[float, float] = quantity(
+        1.0, "a node's energy at the start", above=0, at_most=MOST_J, drawn=True
+    )
 
     if TYPE_CHECKING:  # a kind's are constants, quantities or properties
 
@@ -79,6 +81,11 @@ class Link(Kind):
         tx_j_per_bit: ClassVar[float]  # sending, whatever the distance
         amplifier_j_per_bit_m2: ClassVar[float] = 0.0  # sending, times distance squared
         rx_j_per_bit: ClassVar[float]  # receiving
+
+    @property
+    def most_battery_j(self) -> float:
+        """A node's energy at the start, in the episodes that have the most."""
+        return span(self.battery_j)[1]
 
     @property
     def delivery(self) -> float:

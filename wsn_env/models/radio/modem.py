@@ -41,7 +41,9 @@ class Modem(Link):
     wakeup_bits: int = quantity(
         32, "the wake-up of a search, paid by its receivers", at_least=0, at_most=MOST_BITS, whole=True
     )
-    battery_j: float = quantity(50_000.0, "a node's energy at the start", above=0, at_most=MOST_J)
+    battery_j: float | tuple[float, float] = quantity(
+        50_000.0, "a node's energy at the start", above=0, at_most=MOST_J, drawn=True
+    )
 
     @property
     def tx_j_per_bit(self) -> float:

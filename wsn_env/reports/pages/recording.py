@@ -28,7 +28,8 @@ HUES = {  # by symbol of the frames' legend
     "target": colours.GREEN,
     "search": colours.YELLOW,
 }
-CLOUD = 120  # particles shown of a period
+CLOUD = 120  # particles shown of a period, at most
+LONG = 400  # periods, from which on fewer are shown
 FINE, COARSE = 9999, 999  # steps across the room: of lines and of clouds
 
 
@@ -75,7 +76,7 @@ def _play_episode(name: str, policy: Policy, world: World, seed: int) -> Episode
         add_frame(state, outcome)
         squares.append(outcome.error_m[0] ** 2)
         joules.append(outcome.energy_mj[0])
-        total -= outcome.error_m[0] + state.lam[0] * outcome.energy_mj[0]
+        total -= scenario.counted_m(outcome.error_m[0]) + state.lam[0] * outcome.energy_mj[0]
     scored = squares[scenario.unscored :]
     return Episode(name, frames, float(np.sqrt(np.mean(scored))), float(np.mean(joules)), float(total))
 
@@ -95,7 +96,7 @@ def _common_data(state: State, scenario: Scenario, seed: int) -> dict[str, objec
         "unit_m": whole / FINE,
         "coarse_m": whole / COARSE,
         "radius_m": scenario.radius_m if shows_radius(scenario) else None,
-        "battery_j": scenario.radio.battery_j,
+        "battery_j": float(state.full_j[0]),
         "receiver": receiver,
         "hue": HUES,
         "legend": [(symbol, words) for symbol, words in legend(scenario) if symbol in HUES] + searches,
@@ -114,7 +115,8 @@ def _frame(state: State, outcome: Outcome, scenario: Scenario) -> dict[str, obje
     whole = max(scenario.field.room_m)
     network, belief, reports = state.network, state.belief.row[0], state.reports
     x = state.belief.particles[0]
-    shown = slice(0, None, max(1, -(-x.shape[1] // CLOUD)))
+    points = CLOUD * LONG // max(LONG, scenario.periods) or 1
+    shown = slice(0, None, max(1, -(-x.shape[1] // points)))
     charged = state.ledger.charged[0, : state.ledger.count[0]]
     frame = {
         "mean": _grid_steps(belief["mean"][::2], whole),

@@ -1,0 +1,95 @@
+"""How long networks last: rules and the policy of PreDC-v0 at fixed and at steered prices of energy, in Lifetime-v0.
+
+    python -m studies.lifetime --out out/lifetime
+
+The same episodes at every battery. Prices are in m/mJ; a fixed one is `budget:steering=0`.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import tyro
+
+from wsn_env.evaluation.files import replacing
+from wsn_env.evaluation.intervals import Measured
+from wsn_env.evaluation.policies import make_policy
+from wsn_env.evaluation.progress import progress_bar
+from wsn_env.evaluation.rollout import BLOCK, evaluation_seeds, rollout
+from wsn_env.reports.markdown import markdown_table
+from wsn_env.scenario import Scenario
+from wsn_env.simulation.world import World
+
+BATTERIES_MJ = (0.5, 1.0, 2.0, 4.0)
+PRICES = (2, 4, 8, 16, 30)
+RULES = {"greedy": "greedy", "ppo of PreDC-v0": "ppo:of=PreDC-v0"}
+STEERED = {"greedy": "price=16,steering=0.5", "ppo of PreDC-v0": "price=16,steering=1"}  # found on other episodes
+PLAIN = ("static_cluster", "pre_dc", "nearest0", "nearest1", "nearest2")
+SHOWN_MJ = 2.0  # of the table of all metrics
+
+
+@dataclass
+class Lifetimes:
+    """How many episodes."""
+
+    episodes: int = 200
+    """At every battery."""
+    seed: int = 0
+    """As of `wsn evaluate`."""
+    out: Path = Path("out/lifetime")
+    """Folder."""
+
+
+def policies() -> dict[str, str]:
+    """Names of policies by label."""
+    named = {name: name for name in PLAIN}
+    for label, rule in RULES.items():
+        named |= {f"{label}, price {price}": f"budget:rule={rule},price={price},steering=0" for price in PRICES}
+        named[f"{label}, {STEERED[label].replace('=', ' ').replace(',', ', ')}"] = (
+            f"budget:rule={rule},{STEERED[label]}"
+        )
+    return named
+
+
+def play(policy: str, battery_mj: float, asked: Lifetimes) -> dict[str, np.ndarray]:
+    """Columns of an evaluation."""
+    scenario = Scenario.named("Lifetime-v0", battery_j=battery_mj / 1e3)
+    made, world, seeds = make_policy(policy, scenario), World(scenario), evaluation_seeds(asked.seed, asked.episodes)
+    rows = [row for k in range(0, len(seeds), BLOCK) for row in rollout(made, world, seeds[k : k + BLOCK])]
+    return {column: np.array([row[column] for row in rows]) for column in rows[0]}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Play, print and write batteries.md and metrics.md."""
+    asked = tyro.cli(Lifetimes, args=arguments, description=__doc__)
+    asked.out.mkdir(parents=True, exist_ok=True)
+    errors, metrics, named = [], [], policies()
+    with progress_bar() as report:
+        for number, (label, policy) in enumerate(named.items()):
+            found = {}
+            for battery_mj in BATTERIES_MJ:
+                report(number, len(named), f"{label}, {battery_mj:g} mJ")
+                found[battery_mj] = play(policy, battery_mj, asked)
+            errors.append([label, *(str(Measured.mean(each["error_m"])) for each in found.values())])
+            shown = found[SHOWN_MJ]
+            periods = (str(Measured.mean(shown[name])) for name in ("first_death", "half_dead", "functional"))
+            share = f"{100 * shown['tracked'].mean():.1f}"
+            left = f"{shown['stranded_mj'].mean():.0f}", f"{shown['stranded_sd'].mean():.2f}"
+            metrics.append([label, str(Measured.mean(shown["error_m"])), *periods, share, *left])
+    columns = ["first death", "half dead", "functional", "tracked %", "left mJ", "sd of shares left"]
+    tables = {
+        "batteries": markdown_table(["counted error m", *(f"{each:g} mJ" for each in BATTERIES_MJ)], errors),
+        "metrics": markdown_table([f"{SHOWN_MJ:g} mJ a node", "counted error m", *columns], metrics),
+    }
+    for name, text in tables.items():
+        with replacing(asked.out / f"{name}.md") as path:
+            path.write_text(text, encoding="utf-8")
+        print(text)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

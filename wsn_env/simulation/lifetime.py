@@ -1,0 +1,66 @@
+"""How long a network lasts: deaths, the functional lifetime, and the energy that is left over.
+
+A network is *functional* until the mean error of WINDOW periods first exceeds a sensing radius; errors count as at most
+the scenario's `error_cap_m`. (Dietrich & Dressler, 2009, list such definitions.) What has not happened by the horizon
+counts as happening at it, so that means are lower bounds.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from wsn_env.compiled.kernels import lean_piece
+from wsn_env.models.state import State
+
+METRICS = ("first_death", "half_dead", "functional", "tracked", "stranded_mj", "stranded_sd")
+
+
+@lean_piece
+def clear_life(state: Any, b: int) -> None:
+    """Nothing has happened yet."""
+    life = state.life[b]
+    life.first_death, life.half_dead, life.functional, life.tracked, life.window_m = 0, 0, 0, 0, 0.0
+    state.recent_m[b] = 0.0
+
+
+@lean_piece
+def count_life(state: Any, b: int, error_m: float, t: Any) -> None:
+    """A period of row b with this error [m].
+
+    Args:
+        t: the scenario's constants of tracking.
+    """
+    period, life, recent_m = state.row[b].period, state.life[b], state.recent_m[b]
+    if period == 0:
+        return
+    slot, counted = (period - 1) % len(recent_m), min(error_m, t.error_cap_m)
+    life.window_m += counted - recent_m[slot]
+    recent_m[slot] = counted
+    if life.functional == 0 and period >= len(recent_m) and life.window_m > len(recent_m) * t.radius_m:
+        life.functional = period
+    life.tracked += error_m <= t.radius_m
+    nodes, living = state.residual_j.shape[1], state.living[b]
+    if life.first_death == 0 and living < nodes:
+        life.first_death = period
+    if life.half_dead == 0 and 2 * living <= nodes:
+        life.half_dead = period
+
+
+def lifetimes(state: State, periods: int) -> dict[str, np.ndarray]:
+    """What an episode's end tells of its network, by name, (B,) each.
+
+    Args:
+        state: at the end.
+        periods: the horizon.
+
+    Returns: METRICS: the periods in which the first node, and half of them, had died, and in which the network ceased
+        to be functional (the horizon, where it has not happened); the share of the periods whose error was at most a
+        sensing radius; the energy left in all nodes together [mJ], and the standard deviation over the nodes of the
+        share of their batteries.
+    """
+    life, residual_j = state.life, state.residual_j
+    found = {name: np.where(life[name] > 0, life[name], periods) for name in METRICS[:3]}
+    found["tracked"] = life["tracked"] / np.maximum(state.period, 1)
+    found["stranded_mj"] = 1e3 * residual_j.sum(axis=1)
+    found["stranded_sd"] = (residual_j / state.full_j[:, None]).std(axis=1)
+    return found
