@@ -24,7 +24,9 @@ from benchmarks.filters.textbook import ParticleFilter
 from wsn_env.reports.markdown import block_names
 
 MEASUREMENTS = ("position", "rssi")
-NAMES = [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW_STARTERS)) for name in IMPLEMENTATIONS]
+NAMES = [
+    pytest.param(name, marks=[pytest.mark.slow, pytest.mark.full] * (name in SLOW_STARTERS)) for name in IMPLEMENTATIONS
+]
 
 
 def skipping_absent(function, *arguments, **keywords):

@@ -56,6 +56,7 @@ def test_a_node_that_is_killed_costs_a_retry_and_not_a_row(cluster, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.full
 def test_a_worker_that_is_killed_costs_a_retry(tmp_path):
     ray = pytest.importorskip("ray")
     ray.init("local", num_cpus=2, log_to_driver=False)

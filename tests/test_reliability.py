@@ -27,10 +27,13 @@ def test_trials_in_a_short_form_find_nothing(trial, tmp_path, capsys):
     assert (tmp_path / f"{trial}.md").read_text() in capsys.readouterr().out
 
 
+LONG = pytest.param("reproduce", "2 3", marks=[pytest.mark.slow, pytest.mark.full])
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="kills forks of itself")
 @pytest.mark.parametrize(
     ("name", "moments"),
-    [("evaluate", "2 5 9 14"), ("front", "4 12"), *((name, "2 3") for name in ("replay", "calibrate", "reproduce"))],
+    [("evaluate", "2 5 9 14"), ("front", "4 12"), *((name, "2 3") for name in ("replay", "calibrate")), LONG],
 )
 def test_killed_at_some_files_the_same_command_ends_with_the_same_bytes(name, moments, tmp_path):
     """Trainings: test_train.py."""

@@ -515,9 +515,12 @@ def test_saved_policies_are_checked(run, tmp_path):
         make_policy("ppo", Scenario.named("Anchors-v0")).act(None)
 
 
-def test_help_explains_every_setting():
-    answer = subprocess.run([sys.executable, train.__file__, "--help"], capture_output=True, text=True, check=True)
+def test_help_explains_every_setting(capsys):
+    with pytest.raises(SystemExit) as ended:
+        train.main(["--help"])
+    shown = capsys.readouterr().out
     for name in train.Training.__dataclass_fields__:
-        assert f"--{name.replace('_', '-')}" in answer.stdout
-    bad = subprocess.run([sys.executable, train.__file__, "--lam", "-3"], capture_output=True, text=True)
-    assert bad.returncode == 2 and "lam" in bad.stderr and bad.stderr.count("\n") == 1
+        assert f"--{name.replace('_', '-')}" in shown
+    assert not ended.value.code and train.main(["--lam", "-3"]) == 2
+    told = capsys.readouterr().err
+    assert "lam" in told and told.count("\n") == 1

@@ -179,7 +179,7 @@ def test_async_vector_env_equals_the_native_batch(context):
         theirs.close()
 
 
-@pytest.mark.parametrize("context", ["spawn", "fork"])
+@pytest.mark.parametrize("context", [pytest.param("spawn", marks=[pytest.mark.slow, pytest.mark.full]), "fork"])
 def test_subproc_vec_env_equals_dummy_vec_env(context):
     pair = DummyVecEnv([make] * ROWS), SubprocVecEnv([make] * ROWS, start_method=context)
     try:

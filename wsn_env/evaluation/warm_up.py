@@ -33,6 +33,7 @@ JOBS = (  # the longest first
     Job("Binary-v0", ("boundary",)),
     Job("Ble-v0", ()),
     Job("Anchors-v0", ()),
+    Job("Lifetime-v0", ()),
 )
 
 
