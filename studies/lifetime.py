@@ -81,8 +81,8 @@ def main(arguments: list[str] | None = None) -> int:
             metrics.append([label, str(Measured.mean(shown["error_m"])), *periods, share, *left])
     columns = ["first death", "half dead", "functional", "tracked %", "left mJ", "sd of shares left"]
     tables = {
-        "batteries": markdown_table(["counted error m", *(f"{each:g} mJ" for each in BATTERIES_MJ)], errors),
-        "metrics": markdown_table([f"{SHOWN_MJ:g} mJ a node", "counted error m", *columns], metrics),
+        "batteries": markdown_table(["capped error m", *(f"{each:g} mJ" for each in BATTERIES_MJ)], errors),
+        "metrics": markdown_table([f"{SHOWN_MJ:g} mJ a node", "capped error m", *columns], metrics),
     }
     for name, text in tables.items():
         with replacing(asked.out / f"{name}.md") as path:
