@@ -80,4 +80,4 @@ def _fill_prices(start: int, stop: int, cs: Any, handle: np.ndarray, terms: Any,
         describe_energy(known, b, cs[0], told)
         ahead = log(max(told[AHEAD], LEAST_SHARE)) - log(max(told[LEFT], LEAST_SHARE))
         found = log(price) - steering * 4.0 * told[SUPPLY] - nearby * ahead
-        prices[b] = min(max(exp(min(found, 20.0)), LEAST), MOST)
+        prices[b] = exp(min(max(found, log(LEAST)), log(MOST)))

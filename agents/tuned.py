@@ -12,14 +12,16 @@ import numpy.typing as npt
 
 from wsn_env.scenario import Scenario
 
-# Scenarios whose periods are another's: horizon, batteries and what an error counts differ.
+# Whose rules serve until a scenario has its own: its periods differ in horizon, batteries and what an error counts.
 SAME_PERIODS = {"Lifetime-v0": "PreDC-v0"}
 TABLE = Path(__file__).with_name("tuned.json")
 
 
 def tuned(scenario: Scenario, rule: str) -> Any:
     """What was found best for a rule in the scenario of this name; None: nothing was tuned."""
-    return _load_table().get(SAME_PERIODS.get(scenario.name, scenario.name), {}).get(rule)
+    table = _load_table()
+    name = scenario.name if scenario.name in table else SAME_PERIODS.get(scenario.name)
+    return table.get(name, {}).get(rule)
 
 
 def nearest_lam(lams: npt.ArrayLike, lam: npt.ArrayLike) -> np.ndarray:

@@ -11,17 +11,14 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import tyro
 
+from studies.tables import play
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.intervals import Measured
-from wsn_env.evaluation.policies import make_policy
 from wsn_env.evaluation.progress import progress_bar
-from wsn_env.evaluation.rollout import BLOCK, evaluation_seeds, rollout
 from wsn_env.reports.markdown import markdown_table
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.world import World
 
 BATTERIES_MJ = (0.5, 1.0, 2.0, 4.0)
 PRICES = (2, 4, 8, 16, 30)
@@ -37,8 +34,6 @@ class Lifetimes:
 
     episodes: int = 200
     """At every battery."""
-    seed: int = 0
-    """As of `wsn evaluate`."""
     out: Path = Path("out/lifetime")
     """Folder."""
 
@@ -54,14 +49,6 @@ def policies() -> dict[str, str]:
     return named
 
 
-def play(policy: str, battery_mj: float, asked: Lifetimes) -> dict[str, np.ndarray]:
-    """Columns of an evaluation."""
-    scenario = Scenario.named("Lifetime-v0", battery_j=battery_mj / 1e3)
-    made, world, seeds = make_policy(policy, scenario), World(scenario), evaluation_seeds(asked.seed, asked.episodes)
-    rows = [row for k in range(0, len(seeds), BLOCK) for row in rollout(made, world, seeds[k : k + BLOCK])]
-    return {column: np.array([row[column] for row in rows]) for column in rows[0]}
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Play, print and write batteries.md and metrics.md."""
     asked = tyro.cli(Lifetimes, args=arguments, description=__doc__)
@@ -72,7 +59,8 @@ def main(arguments: list[str] | None = None) -> int:
             found = {}
             for battery_mj in BATTERIES_MJ:
                 report(number, len(named), f"{label}, {battery_mj:g} mJ")
-                found[battery_mj] = play(policy, battery_mj, asked)
+                scenario = Scenario.named("Lifetime-v0", battery_j=battery_mj / 1e3)
+                found[battery_mj] = play(scenario, policy, asked.episodes)
             errors.append([label, *(str(Measured.mean(each["error_m"])) for each in found.values())])
             shown = found[SHOWN_MJ]
             periods = (str(Measured.mean(shown[name])) for name in ("first_death", "half_dead", "functional"))

@@ -128,7 +128,7 @@ def describe_energy(known: Any, b: int, c: Any, f: np.ndarray) -> None:
         c: the scenario's common constants.
     """
     row, network, mean = known.row[b], known.network, known.belief[b].predicted_mean
-    periods, left_j = max(c.periods - row.period, 1.0), max(network.row[b].left_j, 0.0)
+    periods, left_j = max(c.periods - row.period, 1.0), network.row[b].left_j
     f[0] = (c.periods - row.period) / c.periods
     f[1] = 0.25 * log(max(1e3 * left_j / (c.typical_energy_mj * periods), 1e-6))
     f[2] = left_j / (row.full_j * network.battery.shape[1])

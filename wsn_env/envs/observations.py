@@ -47,7 +47,7 @@ class Observation(Protocol):
 
 
 @kernel
-def _encode_candidates(start, stop, cs, handle, terms, found, out):
+def _encode_candidates(start, stop, cs, handle, found, out):
     """Fill out (B, n): `belief_features`, then CANDIDATE_FEATURES of each candidate. Only in the rows marked.
 
     Args:
@@ -81,12 +81,12 @@ def _encode_candidates_of(b, c, known, found, ranking, out):
 
 
 @kernel
-def _encode_menu(start, stop, cs, handle, terms, found, out):
+def _encode_menu(start, stop, cs, handle, found, out, terms):
     """Fill out (B, n): `belief_features`, then `entry_features` of each of the menu's entries. Only in the rows marked.
 
     Args:
-        terms: the place in ORDERS, the scenario's typical cost in each row (B,) [m].
         found: as for `_encode_candidates`, to the depth REPORTS_AHEAD.
+        terms: the place in ORDERS, the scenario's typical cost in each row (B,) [m].
         The rest: as `_encode_candidates`.
     """
     known, ranking = knowledge_at(handle), np.empty(found[1], RANKED)
@@ -143,11 +143,12 @@ class CandidatesObservation:
 
     def _fill(self, view: View, rows, expected: Expected, out) -> np.ndarray:
         threads, found = threads_for(rows, self._threads), (rows, self._candidates, expected.table)
-        arguments = self._constants, view.knowledge.handle, self._terms(view), found, out
+        arguments = self._constants, view.knowledge.handle, found, out, *self._terms(view)
         over_rows(self._encode, len(rows), threads, *arguments)
         return out
 
-    def _terms(self, view: View) -> Any:
+    def _terms(self, view: View) -> tuple[Any, ...]:
+        """What the kernel wants beside."""
         return ()
 
 
@@ -164,8 +165,8 @@ class MenuObservation(CandidatesObservation):
     def _shape(scenario: Scenario, candidates: int) -> tuple[int, int]:
         return MENU_ENTRIES, len(entry_features(scenario))
 
-    def _terms(self, view: View) -> Any:
-        return self._by, self._scenario.typical_cost(view.lam)
+    def _terms(self, view: View) -> tuple[Any, ...]:
+        return ((self._by, self._scenario.typical_cost(view.lam)),)
 
 
 class DictObservation:
