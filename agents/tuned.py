@@ -20,7 +20,7 @@ TABLE = Path(__file__).with_name("tuned.json")
 def tuned(scenario: Scenario, rule: str) -> Any:
     """What was found best for a rule in the scenario of this name; None: nothing was tuned."""
     table = _load_table()
-    name = scenario.name if scenario.name in table else SAME_PERIODS.get(scenario.name)
+    name = scenario.name if scenario.name in table else SAME_PERIODS.get(scenario.name, "")
     return table.get(name, {}).get(rule)
 
 
