@@ -20,13 +20,15 @@ LINKS := out/types
 train: $(READY)
 	$(RUN) train.py --resume --scenario $(SCENARIO) $(if $(LAM),--lam $(LAM))
 
-# The policies that come with the package, trained again; 25 minutes.
-pretrained: pretrained-PreDC-v0 pretrained-Rssi-v0 pretrained-Ble-v0
+# The policies that come with the package, trained again; 45 minutes.
+pretrained: pretrained-PreDC-v0 pretrained-Rssi-v0 pretrained-Ble-v0 pretrained-Lifetime-v0
 
 pretrained-PreDC-v0: STEPS := 3000000
 pretrained-Rssi-v0: STEPS := 4000000
 pretrained-Ble-v0: STEPS := 1000000
 pretrained-Ble-v0: MORE := --set particles=400
+pretrained-Lifetime-v0: STEPS := 6000000
+pretrained-Lifetime-v0: MORE := --set battery_j=0.0005..0.004 --vary
 pretrained-%: $(READY)
 	$(RUN) train.py --resume --runs out/pretrained --scenario $* --steps $(STEPS) $(MORE) --episodes 0
 	cp out/pretrained/$*/policy.json out/pretrained/$*/policy.safetensors agents/pretrained/$*/

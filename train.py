@@ -10,9 +10,11 @@ from __future__ import annotations
 import json
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 import torch
@@ -21,7 +23,8 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.utils import LinearSchedule
 
-from wsn_env.agents.ppo import PPOPolicy, save_policy
+from wsn_env.agents.budget import find_price
+from wsn_env.agents.ppo import PRICE, PPOPolicy, save_policy
 from wsn_env.cli import make_scenario
 from wsn_env.envs.interface import Settings
 from wsn_env.envs.observations import ObservationName
@@ -38,6 +41,7 @@ from wsn_env.learning.concat_vector_env import ConcatVectorEnv
 from wsn_env.learning.defaults import default_level, default_node_counts, default_order
 from wsn_env.learning.levelling import LevelledRollout
 from wsn_env.learning.network import PolicyNetwork
+from wsn_env.learning.priced_vector_env import PricedVectorEnv
 from wsn_env.learning.replayable import ReplayableRows
 from wsn_env.learning.run_folder import facts_of, open_folder, open_progress
 from wsn_env.learning.sb3 import SB3VecEnv
@@ -55,6 +59,8 @@ from wsn_env.scenario import Scenario
 
 SIZED = ("nearest", "informed")  # compared with each of SIZES
 SIZES = range(9)  # further members
+PRICED = 32  # episodes in which the price of scarce energy is found
+PERIODS = 500_000  # of the comparison, unless another number of episodes is asked for
 SLOW = ("ppo", "planner")  # left out of the comparison: the one trained is in it, the other takes hours
 
 
@@ -79,6 +85,9 @@ class Training:
     """What it chooses from."""
     order: Order | None = None
     """The menu's order of merit; left out: by what the nodes measure."""
+    steering: float | None = None
+    """How the price of energy follows its scarcity: lam is multiplied by supply^-steering in every period. Left out:
+    1 where energy is scarce, else 0."""
     reward: Literal["belief", "error"] = "belief"
     """Training reward: belief (what the filter expects, low variance) | error (the true error)."""
 
@@ -136,8 +145,8 @@ class Training:
     """Periods between checkpoints."""
 
     # comparison
-    episodes: int = 1000
-    """Held-out episodes of the paired comparison; 0: none."""
+    episodes: int | None = None
+    """Held-out episodes of the paired comparison; 0: none. Left out: 1000, and fewer where they are long."""
     evaluation_seed: int = 0
     """Which held-out episodes."""
 
@@ -188,8 +197,12 @@ def train(settings: Training) -> None:
     network = learn(settings, scenario, interface, folder)
 
     made = {name: value for name, value in values.items() if name not in ("name", "runs")}
-    facts = {"training": made, "scenario": scenario.as_dict(), "versions": versions()}
+    facts: dict[str, Any] = {"training": made, "scenario": scenario.as_dict(), "versions": versions()}
     policy = save_policy(folder, network, interface, facts)
+    if settings.steering:
+        with progress_bar() as report:
+            facts[PRICE] = find_price(str(policy), scenario, range(settings.seed, settings.seed + PRICED), report)
+        policy = save_policy(folder, network, interface, facts)
     print(f"saved: {policy}")
     if settings.episodes:
         compare(settings, scenario, {"ppo": PPOPolicy(scenario, path=str(policy))} | rules, made)
@@ -209,6 +222,10 @@ def complete_settings(settings: Training) -> Scenario:
         settings.order = default_order(scenario)
     if settings.level is None:
         settings.level = default_level(scenario)
+    if settings.steering is None:
+        settings.steering = float(scenario.scarce_energy)
+    if settings.episodes is None:
+        settings.episodes = min(1000, PERIODS // scenario.periods)
     if settings.vary is None:
         settings.vary = [f"nodes={nodes}" for nodes in default_node_counts(scenario)]
     low, high = settings.lam[0], settings.lam[-1]
@@ -286,7 +303,10 @@ def make_envs(settings: Training, scenario: Scenario, interface: Settings, rows:
     shares = np.diff(np.arange(len(scenarios) + 1) * rows // len(scenarios))
     parts = []
     for one, share in zip(scenarios, shares):
-        envs = ClusterVectorEnv(int(share), one, autoreset_mode="Disabled", **asdict(interface))
+        rows_of: Callable[..., ClusterVectorEnv] = ClusterVectorEnv
+        if settings.steering:
+            rows_of = partial(PricedVectorEnv, steering=settings.steering)
+        envs = rows_of(int(share), one, autoreset_mode="Disabled", **asdict(interface))
         parts.append(TrainingReward(envs, calibrated=settings.reward == "belief"))
     return ConcatVectorEnv(parts)
 
@@ -298,6 +318,7 @@ def check_settings(settings: Training) -> None:
     check_quantity("Training", "batch", settings.batch, at_least=2)  # advantages are normalised by its sd
     for name in ("gamma", "gae_lambda", "level"):
         check_quantity("Training", name, getattr(settings, name), at_least=0, at_most=1)
+    check_quantity("Training", "steering", settings.steering, at_least=0, at_most=100)
     check_quantity("Training", "learning_rate", settings.learning_rate, above=0, at_most=1)
     check_quantity("Training", "entropy", settings.entropy, at_least=0, at_most=100)
     for name in ("units", "critic"):
@@ -379,9 +400,11 @@ def compare(settings: Training, scenario: Scenario, policies: dict[str, Policy],
     """Paired comparison with every baseline: table, CSV, JSON, picture, report."""
     folder = settings.folder
     lams = settings.lam if len(settings.lam) == 1 else scenario.lam_octaves
+    if settings.steering:
+        lams = [0.0]  # the price was the network's own affair
     with progress_bar() as report:
         evaluation = evaluate(
-            policies, scenario, lams, settings.episodes, settings.evaluation_seed, keep=folder, progress=report
+            policies, scenario, lams, settings.episodes or 0, settings.evaluation_seed, keep=folder, progress=report
         )
     evaluation.save(folder)
     save_markdown(evaluation, folder)

@@ -2,49 +2,48 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from itertools import product
 
 import numpy as np
 
 from wsn_env.agents.base import ViewPolicy
-from wsn_env.compiled.elementary import exp, log
-from wsn_env.compiled.kernels import kernel
-from wsn_env.envs.features import ENERGY_FEATURES, describe_energy
+from wsn_env.envs.scarcity import MOST, energy_prices
 from wsn_env.evaluation.policies import Policy, make_policy
+from wsn_env.evaluation.progress import Progress
+from wsn_env.evaluation.rollout import rollout
 from wsn_env.models.quantity import check_quantity, short
-from wsn_env.models.state import Cluster, knowledge_at
-from wsn_env.scenario.constants import common_constants
+from wsn_env.models.state import Cluster
+from wsn_env.scenario import Scenario
 from wsn_env.simulation.view import View
+from wsn_env.simulation.world import World
 
-LEAST, MOST = 1e-3, 1e3  # prices [m/mJ]
-LEAST_SHARE = 0.01
-SUPPLY, LEFT, AHEAD = (ENERGY_FEATURES.index(name) for name in ("supply", "energy_left", "energy_ahead"))
+PRICES = 8.0, 11.0, 16.0, 22.0  # m/mJ, that `find_price` tries
+STEERINGS = 0.7, 1.0, 1.4, 2.0
 
 
 @dataclass(frozen=True)
 class Budget(ViewPolicy):
-    """A rule that trades error for energy, at a price that steers what is spent.
+    """A rule that trades error for energy, at a price that steers what is spent where the target is.
 
-        lam = price * supply^-steering * (share ahead / share)^-nearby   [m/mJ]
+        lam = price * supply^-steering   [m/mJ]
 
-    with `supply` the energy left over what the scenario calls typical for the time left, and the share of the batteries
-    about the target's way over that of all of them. It is a proportional controller of the dual variable of "spend no
-    more than there is" on the logarithmic scale: what has been saved makes the rest cheaper. With steering = nearby = 0
-    the price is fixed. The row's own lam does not count.
+    with `supply` the energy left about the predicted position over what a typical schedule would spend while the target
+    is about there in the time left: nodes that it seldom comes to are cheap, and a place that is worn is dear. It is a
+    proportional controller, on the logarithmic scale, of the dual variables of "spend no more than there is", one for
+    every place. With steering = 0 the price is fixed. The row's own lam does not count.
     """
 
     rule: str = "greedy"  # a policy's name, or the path of a learned one
     price: float = 16.0  # m/mJ, where what is left is just what is typical
-    steering: float = 0.5
-    nearby: float = 0.0
+    steering: float = 1.4
     sees_lam = False
 
     def __post_init__(self) -> None:
         check_quantity("Budget", "price", self.price, above=0, at_most=MOST)
-        for name in ("steering", "nearby"):
-            check_quantity("Budget", name, getattr(self, name), at_least=0, at_most=100)
+        check_quantity("Budget", "steering", self.steering, at_least=0, at_most=100)
         _ = self._inner
 
     @cached_property
@@ -54,30 +53,32 @@ class Budget(ViewPolicy):
         except ValueError as problem:
             raise ValueError(f"Budget.rule = {short(repr(self.rule))}: {problem}") from problem.__cause__
 
+    @cached_property
+    def _scarce(self) -> Scenario:
+        return self.scenario.override(scarce_energy=True)
+
     def act(self, view: View) -> Cluster:
         """What the rule does at the price."""
         return self._inner.act(view.at_lam(self.prices(view)))
 
     def prices(self, view: View) -> np.ndarray:
         """(B,) of energy now [m/mJ]."""
-        prices, terms = np.empty(len(view.row)), (self.price, self.steering, self.nearby)
-        _fill_prices(0, len(prices), common_constants(self.scenario), view.knowledge.handle, terms, prices)
-        return prices
+        return energy_prices(view, self._scarce, self.price, self.steering)
 
 
-@kernel
-def _fill_prices(start: int, stop: int, cs: Any, handle: np.ndarray, terms: Any, prices: np.ndarray) -> None:
-    """(B,) prices.
+def find_price(rule: str, scenario: Scenario, seeds: Sequence[int], report: Progress) -> tuple[float, float]:
+    """Price and steering under which a rule's errors are least, of a few.
 
     Args:
-        cs: the scenario's common constants.
-        handle: of what the network knows (Knowledge).
-        terms: price, steering, nearby.
+        rule: a policy's name, or the path of a learned one.
+        seeds: of episodes to try them in, apart from those that anything is evaluated on.
     """
-    known, told = knowledge_at(handle), np.empty(len(ENERGY_FEATURES))
-    price, steering, nearby = terms
-    for b in range(start, stop):
-        describe_energy(known, b, cs[0], told)
-        ahead = log(max(told[AHEAD], LEAST_SHARE)) - log(max(told[LEFT], LEAST_SHARE))
-        found = log(price) - steering * 4.0 * told[SUPPLY] - nearby * ahead
-        prices[b] = exp(min(max(found, log(LEAST)), log(MOST)))
+    world, errors = World(scenario.override(lam=0.0)), {}
+    tried = list(product(PRICES, STEERINGS))
+    for number, (price, steering) in enumerate(tried):
+        report(number, len(tried), f"price {price:g}, steering {steering:g}")
+        policy = Budget(world.scenario, rule, price, steering)
+        rows = rollout(policy, world, seeds)
+        # An episode counts by ratios: where batteries are drawn the poorest have the largest errors.
+        errors[price, steering] = np.mean(np.log([row["error_m"] for row in rows]))
+    return min(errors, key=lambda each: errors[each])

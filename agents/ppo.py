@@ -17,17 +17,20 @@ from gymnasium.spaces import Discrete
 
 from wsn_env.agents.base import ViewPolicy
 from wsn_env.envs.interface import Interface, Settings
+from wsn_env.envs.scarcity import MOST, energy_prices
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.policies import read_saved
 from wsn_env.learning.network import EntryNetwork, FlatNetwork, PolicyNetwork
 from wsn_env.models.arguments import checked
 from wsn_env.models.own_files import file_digest
-from wsn_env.models.quantity import short
+from wsn_env.models.quantity import check_quantity, short
 from wsn_env.models.state import Cluster
+from wsn_env.scenario import Scenario
 from wsn_env.simulation.view import View
 
 PRETRAINED = Path(__file__).parent / "pretrained"
 DIGEST = "sha256"  # of policy.safetensors
+PRICE = "price"  # and steering, of energy
 INTERFACES = (("menu", "menu"), ("menu", "candidates"), ("subset", "candidates"))
 
 
@@ -36,7 +39,8 @@ class PPOPolicy(ViewPolicy):
     """Takes the most probable action of the network that `train.py` saved at `path` (a policy.json); left out: of the
     one that comes with the package for the scenario named `of`, or left out, too, for the scenario of this name.
 
-    One that was trained where energy is not scarce sees nothing of it where it is.
+    One that was trained where energy is not scarce sees nothing of it where it is. One that was trained at a price
+    that follows what is left acts, where lam is 0, at the price that was found for it (`energy_prices`).
     """
 
     path: str | Path = ""
@@ -44,7 +48,7 @@ class PPOPolicy(ViewPolicy):
 
     def __post_init__(self) -> None:
         """Read the files now: a missing one is known before anybody plays."""
-        _ = self._interface_and_network
+        _ = self._interface_and_network, self._price
 
     def __repr__(self) -> str:
         """Tells it from others by what it has learned."""
@@ -53,12 +57,33 @@ class PPOPolicy(ViewPolicy):
 
     def __getstate__(self) -> dict[str, Any]:
         """It takes its network along to machines that lack the file."""
-        return self.__dict__ | {"_interface_and_network": self._interface_and_network}
+        return self.__dict__ | {"_interface_and_network": self._interface_and_network, "_price": self._price}
+
+    @property
+    def _path(self) -> Path:
+        return Path(self.path or PRETRAINED / (self.of or self.scenario.name) / "policy.json")
+
+    @cached_property
+    def _price(self) -> tuple[float, float] | None:
+        """Price and steering, where it has one."""
+        (said,) = read_saved(self._path, optional=(PRICE,))
+        if said is None:
+            return None
+        try:
+            price, steering = said
+            check_quantity("price", "price", price, above=0, at_most=MOST)
+            check_quantity("price", "steering", steering, at_least=0, at_most=100)
+        except (TypeError, ValueError) as problem:
+            raise ValueError(f"{self._path} is not a saved policy: {PRICE}: {problem}") from None
+        return price, steering
+
+    @cached_property
+    def _scarce(self) -> Scenario:
+        return self.scenario.override(scarce_energy=True)
 
     @cached_property
     def _interface_and_network(self) -> tuple[Interface, FlatNetwork | EntryNetwork]:
-        home = self.of or self.scenario.name
-        path = Path(self.path or PRETRAINED / home / "policy.json")
+        home, path = self.of or self.scenario.name, self._path
         if not self.path and not path.exists():
             shipped = ", ".join(sorted(folder.name for folder in PRETRAINED.iterdir() if folder.is_dir()))
             if self.of:
@@ -90,6 +115,9 @@ class PPOPolicy(ViewPolicy):
 
     def act(self, view: View) -> Cluster:
         """The most probable action, for every row."""
+        if self._price is not None and (view.lam == 0.0).any():
+            own = energy_prices(view, self._scarce, *self._price)
+            view = view.at_lam(np.where(view.lam == 0.0, own, view.lam))
         interface, network = self._interface_and_network
         logits = network.logits(interface.observation.encode(view))
         ends = np.cumsum(_logit_counts(interface.action.space))[:-1]

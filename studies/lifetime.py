@@ -1,4 +1,4 @@
-"""How long networks last: rules and the policy of PreDC-v0 at fixed and at steered prices of energy, in Lifetime-v0.
+"""How long networks last: rules and learned policies at fixed and at steered prices of energy, in Lifetime-v0.
 
     python -m studies.lifetime --out out/lifetime
 
@@ -11,11 +11,12 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import tyro
 
 from studies.tables import play
 from wsn_env.evaluation.files import replacing
-from wsn_env.evaluation.intervals import Measured
+from wsn_env.evaluation.intervals import Measured, Summary
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.reports.markdown import markdown_table
 from wsn_env.scenario import Scenario
@@ -23,8 +24,23 @@ from wsn_env.scenario import Scenario
 BATTERIES_MJ = (0.5, 1.0, 2.0, 4.0)
 PRICES = (2, 4, 8, 16, 30)
 RULES = {"greedy": "greedy", "ppo of PreDC-v0": "ppo:of=PreDC-v0"}
-STEERED = {"greedy": "price=16,steering=0.5", "ppo of PreDC-v0": "price=16,steering=1"}  # found on other episodes
+STEERED = {"greedy": "price=16,steering=1.4", "ppo of PreDC-v0": "price=8,steering=1"}  # by `find_price`
+LEARNED = "ppo"
+
+
+def _steered(label: str) -> str:
+    """Of a rule at its steered price."""
+    return f"{label}, {STEERED[label].replace('=', ' ').replace(',', ', ')}"
+
+
 PLAIN = ("static_cluster", "pre_dc", "nearest0", "nearest1", "nearest2")
+RIVALS = {  # of the learned policy, each the best of its kind in hindsight, at every battery anew
+    "the best of the rules at no price of their own": PLAIN,
+    "greedy at its best fixed price": tuple(f"greedy, price {price}" for price in PRICES),
+    "ppo of PreDC-v0 at its best fixed price": tuple(f"ppo of PreDC-v0, price {price}" for price in PRICES),
+    "greedy at a steered price": (_steered("greedy"),),
+    "pre_dc": ("pre_dc",),
+}
 SHOWN_MJ = 2.0  # of the table of all metrics
 
 
@@ -43,17 +59,15 @@ def policies() -> dict[str, str]:
     named = {name: name for name in PLAIN}
     for label, rule in RULES.items():
         named |= {f"{label}, price {price}": f"budget:rule={rule},price={price},steering=0" for price in PRICES}
-        named[f"{label}, {STEERED[label].replace('=', ' ').replace(',', ', ')}"] = (
-            f"budget:rule={rule},{STEERED[label]}"
-        )
-    return named
+        named[_steered(label)] = f"budget:rule={rule},{STEERED[label]}"
+    return named | {LEARNED: LEARNED}
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Play, print and write batteries.md and metrics.md."""
+    """Play, print and write batteries.md, learned.md and metrics.md."""
     asked = tyro.cli(Lifetimes, args=arguments, description=__doc__)
     asked.out.mkdir(parents=True, exist_ok=True)
-    errors, metrics, named = [], [], policies()
+    errors, metrics, played, named = [], [], {}, policies()
     with progress_bar() as report:
         for number, (label, policy) in enumerate(named.items()):
             found = {}
@@ -61,6 +75,7 @@ def main(arguments: list[str] | None = None) -> int:
                 report(number, len(named), f"{label}, {battery_mj:g} mJ")
                 scenario = Scenario.named("Lifetime-v0", battery_j=battery_mj / 1e3)
                 found[battery_mj] = play(scenario, policy, asked.episodes)
+            played[label] = {battery_mj: each["error_m"] for battery_mj, each in found.items()}
             errors.append([label, *(str(Measured.mean(each["error_m"])) for each in found.values())])
             shown = found[SHOWN_MJ]
             periods = (str(Measured.mean(shown[name])) for name in ("first_death", "half_dead", "functional"))
@@ -68,8 +83,10 @@ def main(arguments: list[str] | None = None) -> int:
             left = f"{shown['stranded_mj'].mean():.0f}", f"{shown['stranded_sd'].mean():.2f}"
             metrics.append([label, str(Measured.mean(shown["error_m"])), *periods, share, *left])
     columns = ["first death", "half dead", "functional", "tracked %", "left mJ", "sd of shares left"]
+    batteries = [f"{each:g} mJ" for each in BATTERIES_MJ]
     tables = {
-        "batteries": markdown_table(["capped error m", *(f"{each:g} mJ" for each in BATTERIES_MJ)], errors),
+        "batteries": markdown_table(["capped error m", *batteries], errors),
+        "learned": markdown_table(["ppo's error is less by", *batteries], compare_learned(played)),
         "metrics": markdown_table([f"{SHOWN_MJ:g} mJ a node", "capped error m", *columns], metrics),
     }
     for name, text in tables.items():
@@ -77,6 +94,25 @@ def main(arguments: list[str] | None = None) -> int:
             path.write_text(text, encoding="utf-8")
         print(text)
     return 0
+
+
+def compare_learned(played: dict[str, dict[float, np.ndarray]]) -> list[list[str]]:
+    """How much smaller the learned policy's mean error is than each rival's [%], with 95 % intervals of pairs.
+
+    Args:
+        played: errors (episodes,) [m] by label and battery [mJ].
+    """
+    rows = []
+    for name, labels in RIVALS.items():
+        cells = []
+        for battery_mj in BATTERIES_MJ:
+            best = min(labels, key=lambda label: played[label][battery_mj].mean())
+            rival = played[best][battery_mj]
+            saved = Summary.of(100 * (rival - played[LEARNED][battery_mj]) / rival.mean())
+            which = "" if len(labels) == 1 else f", {best.removeprefix('greedy, ').removeprefix('ppo of PreDC-v0, ')}"
+            cells.append(f"{saved.mean:.1f} % ({saved.low:.1f} to {saved.high:.1f}{which})")
+        rows.append([name, *cells])
+    return rows
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ from wsn_env.models.library import DETECTIONS, MEASUREMENTS, MOTIONS, RADIOS
 from wsn_env.models.measurement.base import node_at, sample, weigh
 from wsn_env.models.radio.base import reception, relayed, transmission
 from wsn_env.scenario.constants import constants
-from wsn_env.simulation.episode import Tracks
+from wsn_env.scenario.tracks import Tracks
 
 PLAIN = {name: kind for name, kind in MEASUREMENTS.kinds.items() if kind().independent}
 NODE, TARGET = np.array([[40.0, 50.0]]), (46.0, 53.0)

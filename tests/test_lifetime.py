@@ -1,19 +1,30 @@
 """Networks that have to last: drawn batteries, capped errors, lifetimes, what observations tell of energy and time."""
 
+import json
+import shutil
+from itertools import product
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from wsn_env import ClusterEnv, ClusterVectorEnv, Scenario, View, World, evaluate, make_policy, score
-from wsn_env.agents.budget import Budget
+from wsn_env.agents import ppo
+from wsn_env.agents.budget import PRICES, STEERINGS, Budget, find_price
 from wsn_env.agents.tuned import tuned
 from wsn_env.compiled import draws
 from wsn_env.envs.actions import GROUP, MENU_ENTRIES, make_action
-from wsn_env.envs.features import BELIEF_FEATURES, ENERGY_FEATURES, FAR_AHEAD
+from wsn_env.envs.features import BELIEF_FEATURES
 from wsn_env.envs.observations import make_observation
 from wsn_env.envs.prospects import ENTRY_FEATURES
-from wsn_env.evaluation.rollout import evaluation_seeds
+from wsn_env.envs.scarcity import ENERGY_FEATURES, FAR_AHEAD, LEAST_SUPPLY
+from wsn_env.evaluation.rollout import evaluation_seeds, rollout
+from wsn_env.learning.priced_vector_env import PricedVectorEnv
+from wsn_env.learning.replayable import ReplayableRows
+from wsn_env.learning.sb3 import SB3VecEnv
 from wsn_env.models.quantity import ScenarioError, parse_overrides
 from wsn_env.reports.tables import LIFETIME, table_header
+from wsn_env.scenario.tracks import CELLS, STATES, Tracks, neighbourhood_m, presence
 from wsn_env.simulation.lifetime import METRICS, lifetimes
 
 SMALL = dict(nodes=30, side_m=50.0, particles=60, periods=120)
@@ -146,24 +157,35 @@ def test_what_observations_tell_of_energy_is_what_plain_numpy_finds(halfway):
         np.testing.assert_allclose(told["supply"], 0.25 * np.log(supply), rtol=1e-4, atol=1e-5)
         np.testing.assert_allclose(told["energy_left"], left / (30 * full), rtol=1e-5, atol=1e-6)
         ahead = FAR_AHEAD * POOR.period_s
-        for feature, periods in (("energy_near", 0.0), ("energy_ahead", ahead)):
+        for feature, periods in (("supply_near", 0.0), ("supply_ahead", ahead)):
             points = view.predicted_mean[:, ::2] + periods * view.predicted_mean[:, 1::2]
-            expected = [mean_share(view, b, points[b]) for b in range(20)]
-            np.testing.assert_allclose(told[feature], expected, rtol=1e-5, atol=1e-6)
+            expected = [0.25 * np.log(supply_at(view, b, points[b])) for b in range(20)]
+            np.testing.assert_allclose(told[feature], expected, rtol=1e-4, atol=1e-5)
 
 
-def mean_share(view, b, point):
-    """Of the nodes in the cell of the grid that holds the point and in those about it."""
-    place = view.network.grid.row[b]
-    side, corner = place["side"], np.array([place["x_m"], place["y_m"]])
+def supply_at(view, b, point):
+    """Energy about a point, over what a typical schedule spends while the target is about there in the time left."""
+    reach = neighbourhood_m(POOR)
+    squared = ((view.positions[b] - point) ** 2).sum(axis=1)
+    energy_mj = 1e3 * (view.battery[b] * np.maximum(1 - squared / reach**2, 0)).sum()
+    cell = np.clip((point / POOR.field.side_m * CELLS).astype(int), 0, CELLS - 1)
+    spent_mj = presence(POOR)[tuple(cell)] * POOR.typical_energy_mj * (POOR.periods - view.period[b])
+    return max(energy_mj / spent_mj, LEAST_SUPPLY)
 
-    def cells(points):
-        return np.clip(np.floor((points - corner) / place["cell_m"]), 0, side - 1)
 
-    low, high = cells(point - place["cell_m"]), cells(point + place["cell_m"])
-    of_nodes = cells(view.positions[b])
-    near = ((of_nodes >= low) & (of_nodes <= high)).all(axis=1)
-    return view.battery[b][near].mean() / view.full_j[b] if near.any() else 0.0
+def test_the_map_of_presence_is_that_of_other_tracks():
+    """Of 4,000 fresh ones, within five standard errors; the middle of the field is where waypoints lead to most."""
+    found, reach, rows = presence(POOR), neighbourhood_m(POOR), 4000
+    tracks = np.empty((rows, POOR.periods + 1, 4))
+    keys = np.array([draws.key_of_seed(i) for i in range(rows)], np.uint64)
+    Tracks(POOR).draw(np.ones(rows, bool), keys, tracks, 1)
+    middles = (np.arange(CELLS) + 0.5) * POOR.field.side_m / CELLS
+    for cell in ((0, 0), (5, 12), (12, 12), (23, 7)):
+        squared = (tracks[..., 0] - middles[cell[0]]) ** 2 + (tracks[..., 2] - middles[cell[1]]) ** 2
+        shares = np.maximum(1 - squared / reach**2, 0).mean(axis=1)
+        error = shares.std() / np.sqrt(min(rows, STATES // POOR.periods)) * 1.5
+        assert found[cell] == pytest.approx(shares.mean(), abs=5 * error + 0.02 * shares.mean()), cell  # cells are wide
+    assert found[12, 12] > 4 * found[0, 0]
 
 
 def test_entries_of_the_menu_tell_the_energy_of_head_and_poorest(halfway):
@@ -191,14 +213,37 @@ def test_where_energy_is_not_scarce_observations_are_as_ever():
     assert (entries == less[belief:].reshape(MENU_ENTRIES, -1)).all()
 
 
-def test_a_budgets_price_is_its_formula(halfway):
-    budget = Budget(POOR, price=5.0, steering=0.7, nearby=0.3)
-    told = make_observation("menu", POOR, "nearest", 12).encode(halfway)[:, len(BELIEF_FEATURES) :]
-    told = dict(zip(ENERGY_FEATURES, told.T.astype(float)))
-    ahead = np.maximum(told["energy_ahead"], 0.01) / np.maximum(told["energy_left"], 0.01)
-    price = 5.0 * np.exp(4 * told["supply"]) ** -0.7 * ahead**-0.3
-    np.testing.assert_allclose(budget.prices(halfway), np.clip(price, 1e-3, 1e3), rtol=1e-4)
-    assert price.max() > 2 * price.min()
+@pytest.mark.parametrize("scarce", [True, False])  # whether observations tell of it does not matter
+def test_a_budgets_price_is_its_formula(scarce, halfway):
+    budget = Budget(POOR.override(scarce_energy=scarce), price=5.0, steering=0.7)
+    price = [5.0 * supply_at(halfway, b, halfway.predicted_mean[b, ::2]) ** -0.7 for b in range(20)]
+    np.testing.assert_allclose(budget.prices(halfway), np.clip(price, 1e-3, 1e3), rtol=1e-9)
+    assert max(price) > 2 * min(price)
+
+
+def test_rows_for_training_are_rewarded_and_told_at_the_price_of_their_supply():
+    """The price of a period is what the observation before it told, and what budget finds at the drawn lam."""
+    drawn = POOR.override(lam=(2, 50))
+    envs = PricedVectorEnv(6, drawn, observation="menu", autoreset_mode="Disabled", steering=0.8)
+    plain = ClusterVectorEnv(6, drawn, observation="menu", autoreset_mode="Disabled")
+    observation, _ = envs.reset(seed=3)
+    plain.reset(seed=3)
+    prices, generator = plain.lam.copy(), np.random.default_rng(0)
+    for _ in range(2 * POOR.periods):
+        lam = envs.lam.copy()
+        expected = [Budget(POOR, price=prices[b], steering=0.8).prices(envs.view)[b] for b in range(6)]
+        np.testing.assert_allclose(lam, expected, rtol=1e-12)
+        np.testing.assert_allclose(observation[:, 0], np.clip(0.5 * np.log(np.maximum(lam, 1e-3)), -10, 10), rtol=1e-5)
+        actions = generator.integers(0, MENU_ENTRIES, 6)
+        observation, reward, _, ended, info = envs.step(actions)
+        plain.step(actions)
+        np.testing.assert_allclose(reward, -(drawn.counted_m(info["error_m"]) + lam * info["energy_mj"]), rtol=1e-9)
+        if ended.any():
+            observation, _ = envs.reset(options={"reset_mask": ended})
+            plain.reset(options={"reset_mask": ended})
+            prices = np.where(ended, plain.lam, prices)
+    with pytest.raises(ValueError, match="scarce_energy = False of PreDC-v0: must be True"):
+        PricedVectorEnv(2, "PreDC-v0")
 
 
 @pytest.mark.parametrize("rule", ["greedy", "adaptive", "ppo:of=PreDC-v0"])
@@ -227,3 +272,58 @@ def test_tables_tell_of_lifetimes_where_nodes_die():
     )
     assert table_header(dying, "nearest1")[-len(LIFETIME) :] == list(LIFETIME)
     assert not set(LIFETIME) & set(table_header(lasting, "nearest1"))
+
+
+def test_a_training_at_a_price_goes_on_where_it_was_stopped():
+    """Rows that are played again are told the same prices, to the bit."""
+    drawn, actions = POOR.override(lam=(2, 50)), np.random.default_rng(1).integers(0, MENU_ENTRIES, (170, 4))
+
+    def rows():
+        envs = PricedVectorEnv(4, drawn, observation="menu", autoreset_mode="Disabled")
+        made = ReplayableRows(SB3VecEnv(envs, stagger=True))
+        made.seed(5)
+        return made
+
+    going, again = rows(), rows()
+    going.reset()
+    for each in actions:
+        observation = going.step(each)[0]
+    replayed = again.replay(going.episodes, going.episode_lengths, going.recent_actions(), len(actions))
+    assert (replayed == observation).all()
+    for each in actions[:20]:
+        one, other = going.step(each), again.step(each)
+        assert (one[0] == other[0]).all() and (one[1] == other[1]).all()
+
+
+def test_a_policy_with_a_price_of_its_own_acts_at_it_where_lam_is_0(halfway, tmp_path):
+    shipped = Path(ppo.PRETRAINED) / "PreDC-v0"
+    said = json.loads((shipped / "policy.json").read_text())
+    shutil.copy(shipped / "policy.safetensors", tmp_path)
+    path = tmp_path / "policy.json"
+
+    def act(price, lam):
+        path.write_text(json.dumps(said | ({} if price is None else {"price": price})))
+        return make_policy(str(path), POOR).act(halfway.at_lam(lam))
+
+    def same(one, other):
+        return (one.head == other.head).all() and (one.members == other.members).all()
+
+    none, dear = np.zeros(20), np.full(20, 30.0)
+    budget = Budget(POOR, rule="ppo:of=PreDC-v0", price=9.0, steering=0.8)
+    assert same(act([9.0, 0.8], none), budget.act(halfway))
+    assert same(act([9.0, 0.8], dear), act(None, dear)) and not same(act([9.0, 0.8], dear), budget.act(halfway))
+    half = np.where(np.arange(20) < 10, 0.0, 30.0)
+    assert same(act([9.0, 0.8], half), act(None, np.where(half == 0.0, budget.prices(halfway), half)))
+    for wrong in ([1.0], [0.0, 1.0], ["a", 1.0], 5, [1.0, -1.0]):
+        with pytest.raises(ValueError, match="policy.json is not a saved policy: price"):
+            act(wrong, none)
+
+
+def test_find_price_takes_the_best_of_what_it_tries():
+    seeds, world = range(6), World(POOR)
+    found = find_price("greedy", POOR, seeds, lambda *_: None)
+    errors = {
+        pair: np.mean([np.log(row["error_m"]) for row in rollout(Budget(POOR, "greedy", *pair), world, seeds)])
+        for pair in product(PRICES, STEERINGS)
+    }
+    assert errors[found] == min(errors.values()) < np.mean(list(errors.values()))

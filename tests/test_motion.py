@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wsn_env import Scenario, ScenarioError, World
-from wsn_env.simulation.episode import Tracks
+from wsn_env.scenario.tracks import Tracks
 
 KEYS = st.integers(0, 2**64 - 1)
 

@@ -8,8 +8,8 @@ from wsn_env.compiled.elementary import log
 from wsn_env.compiled.kernels import lean_piece
 from wsn_env.envs.expectations import Outlook
 from wsn_env.envs.merit import gain, position_cov, squared_between
+from wsn_env.envs.scarcity import ENERGY_FEATURES, describe_energy
 from wsn_env.scenario import Scenario
-from wsn_env.simulation.geometry import share_left_about
 
 BELIEF_FEATURES = (
     "lam",  # log, halved
@@ -32,13 +32,6 @@ BELIEF_FEATURES = (
     "joint_detection",  # of the standing cluster
     "sparseness",  # distance of the ninth nearest candidate
 )
-ENERGY_FEATURES = (  # behind them, where energy is scarce
-    "time_left",  # share of the horizon
-    "supply",  # log of the energy left, in what a typical schedule spends in the time left
-    "energy_left",  # share of all batteries
-    "energy_near",  # of those about the prediction
-    "energy_ahead",  # of those about where the target will be FAR_AHEAD periods on, if it keeps its velocity
-)
 CANDIDATE_FEATURES = (
     "ahead",  # in radii along and across the velocity, from the prediction
     "left",
@@ -54,7 +47,6 @@ CANDIDATE_FEATURES = (
 )
 WIDTH = len(CANDIDATE_FEATURES)
 G = len(BELIEF_FEATURES)
-FAR_AHEAD = 15.0
 BOUND = 10.0
 NINTH = 9
 
@@ -117,24 +109,6 @@ def describe_row(known: Any, b: int, outlook: Outlook, c: Any, f: np.ndarray) ->
         describe_energy(known, b, c, f[G : G + len(ENERGY_FEATURES)])
         return heading, G + len(ENERGY_FEATURES)
     return heading, G
-
-
-@lean_piece
-def describe_energy(known: Any, b: int, c: Any, f: np.ndarray) -> None:
-    """Fill f with ENERGY_FEATURES of row b.
-
-    Args:
-        known: what the network knows (Knowledge).
-        c: the scenario's common constants.
-    """
-    row, network, mean = known.row[b], known.network, known.belief[b].predicted_mean
-    periods, left_j = max(c.periods - row.period, 1.0), network.row[b].left_j
-    f[0] = (c.periods - row.period) / c.periods
-    f[1] = 0.25 * log(max(1e3 * left_j / (c.typical_energy_mj * periods), 1e-6))
-    f[2] = left_j / (row.full_j * network.battery.shape[1])
-    f[3] = share_left_about(network, b, mean[0], mean[2], row.full_j)
-    ahead = FAR_AHEAD * c.period_s
-    f[4] = share_left_about(network, b, mean[0] + ahead * mean[1], mean[2] + ahead * mean[3], row.full_j)
 
 
 @lean_piece

@@ -177,8 +177,8 @@ def _suggest_parameter(maker: Any, parameters: dict) -> str:
     return f": {suggest(strange[0], own)}" if strange and own else ""
 
 
-def read_saved(path: Path, *keys: str) -> list[Any]:
-    """What a policy.json says under these keys.
+def read_saved(path: Path, *keys: str, optional: tuple[str, ...] = ()) -> list[Any]:
+    """What a policy.json says under these keys; None under those optional ones that it lacks.
 
     Raises:
         ValueError: the file is missing, damaged or another; names it.
@@ -187,8 +187,8 @@ def read_saved(path: Path, *keys: str) -> list[Any]:
         raise ValueError(f"{path} is not a saved policy: there is no such file")
     try:
         said = json.loads(path.read_text(encoding="utf-8"))
-        return [said[key] for key in keys]
-    except (OSError, ValueError, KeyError, TypeError, RecursionError) as problem:
+        return [*(said[key] for key in keys), *(said.get(key) for key in optional)]
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as problem:
         raise ValueError(f"{path} is not a saved policy: {problem!r}") from None
 
 

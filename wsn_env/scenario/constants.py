@@ -11,6 +11,7 @@ import numpy as np
 from wsn_env.compiled.arrays import record
 from wsn_env.models.kinds import constants_type, fill_constants
 from wsn_env.scenario.scenario import Scenario
+from wsn_env.scenario.tracks import CELLS, neighbourhood_m, presence
 
 KINDS = ("measurement", "detection", "radio")
 
@@ -71,12 +72,18 @@ def _common_constants(scenario):
         "period_s": scenario.period_s,
         "periods": float(scenario.periods),
         "typical_energy_mj": scenario.typical_energy_mj,
+        "neighbourhood_m": neighbourhood_m(scenario),
     }
     plain = [(name, "f8") for name in numbers]
-    made = _zeros([("radio", radio), ("equal_everywhere", "i8"), ("scarce_energy", "i8"), *plain])
+    flags = [("equal_everywhere", "i8"), ("scarce_energy", "i8")]
+    # How wide a cell of the map of presence is along x and y, and the map; zeros where nobody asks for it.
+    mapped = [("cell_m", "f8", 2), ("presence", "f8", (CELLS, CELLS))]
+    made = _zeros([("radio", radio), *flags, *plain, *mapped])
     fill_constants(made["radio"], scenario.radio, scenario)
     made["equal_everywhere"] = scenario.measurement.equal_everywhere
     made["scarce_energy"] = scenario.scarce_energy
+    if scenario.scarce_energy:
+        made["cell_m"], made["presence"] = np.array(scenario.field.room_m) / CELLS, presence(scenario)
     for name, value in numbers.items():
         made[name] = value
     return made

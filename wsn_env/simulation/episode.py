@@ -5,10 +5,8 @@ import numpy as np
 from wsn_env.compiled import draws
 from wsn_env.compiled.arrays import record
 from wsn_env.compiled.elementary import exp, log
-from wsn_env.compiled.kernels import kernel, over_rows, piece
+from wsn_env.compiled.kernels import kernel, piece
 from wsn_env.models.field import lay_out, scatter
-from wsn_env.models.kinds import constants_type, fill_constants
-from wsn_env.models.motion.base import Course, draw, reflect
 from wsn_env.models.quantity import span
 from wsn_env.models.state import state_at
 from wsn_env.scenario import Scenario
@@ -115,42 +113,6 @@ def _draw_between(span, key, purpose):
     if high > low:
         return low * exp(log(high / low) * draws.uniform(draws.stream(key, 0, purpose), 0))
     return low
-
-
-class Tracks:
-    """Draws the target's track of an episode."""
-
-    def __init__(self, scenario: Scenario) -> None:
-        motion = scenario.motion
-        motion.check(scenario)
-        self._motion = np.zeros(1, constants_type(motion, scenario))
-        fill_constants(self._motion, motion, scenario)
-        side_m, depth_m = scenario.field.room_m
-        bounded = motion.bounded and not scenario.ends_outside
-        self._course = scenario.period_s, side_m, depth_m, motion.recorded_tracks(scenario), bounded
-
-    def draw(self, rows: np.ndarray, keys: np.ndarray, tracks: np.ndarray, threads: int) -> None:
-        """Fill tracks (B, periods + 1, 4) in the rows marked."""
-        over_rows(_draw_tracks, len(rows), threads, self._motion, self._course, rows, keys, tracks)
-
-
-@kernel
-def _draw_tracks(start, stop, cs, course, rows, keys, tracks):
-    """Fill tracks in the rows marked.
-
-    Args:
-        course: the fields of a Course.
-    """
-    period_s, side_m, depth_m, recorded, bounded = course
-    for b in range(start, stop):
-        if rows[b]:
-            track = tracks[b]
-            stream = draws.stream(keys[b], 0, draws.TRACK)
-            draw(cs[0], stream, Course(period_s, side_m, depth_m, recorded, bounded), track)
-            if bounded:
-                for state in track:
-                    reflect(state, 0, side_m)
-                    reflect(state, 2, depth_m)
 
 
 @piece

@@ -53,18 +53,17 @@ def cells_within(place: Any, x: float, y: float, reach_m: float) -> tuple[Any, .
 
 
 @lean_piece
-def share_left_about(network: Any, b: int, x: float, y: float, full_j: float) -> float:
-    """Mean share of the batteries of row b about a point: of the nodes in its cell of the grid and in the eight about
-    it, some 9 x 4 whatever the density; 0 where there are none."""
-    battery, grid = network.battery[b], network.grid
+def energy_about(network: Any, b: int, x: float, y: float, reach_m: float) -> float:
+    """Energy in the batteries of row b about a point [J]: a node at the distance d counts as 1 - (d / reach)^2."""
+    positions, battery, grid = network.positions[b], network.battery[b], network.grid
     place, starts, nodes = grid.row[b], grid.starts[b], grid.nodes[b]
-    lines = cells_within(place, x, y, place.cell_m)
-    total, count = 0.0, 0
+    lines = cells_within(place, x, y, reach_m)
+    total = 0.0
     for line in range(lines[0], lines[1] + 1):
         for slot in range(starts[line * place.side + lines[2]], starts[line * place.side + lines[3] + 1]):
-            total += battery[nodes[slot]]
-            count += 1
-    return total / (count * full_j) if count > 0 else 0.0
+            d2 = squared_distance(positions, nodes[slot], x, y)
+            total += battery[nodes[slot]] * max(1.0 - d2 / (reach_m * reach_m), 0.0)
+    return total
 
 
 @lean_piece

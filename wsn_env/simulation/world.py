@@ -16,6 +16,7 @@ from wsn_env.models.quantity import short, whole_number
 from wsn_env.models.state import OUTCOME, Cluster, Grid, Outcome, State, Tracker
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import constants
+from wsn_env.scenario.tracks import Tracks
 from wsn_env.simulation import episode, period, search
 
 LONG_LIST = 64
@@ -40,7 +41,7 @@ class World:
         self.tracker: Tracker = make_tracker(scenario, self.threads, fast)
         self._run = kernels.Pinned(kernels.fast(period.run) if fast else period.run)
         self._constants = constants(scenario)
-        self._tracks, self._packets = episode.Tracks(scenario), scenario.measurement.packets_of(scenario)
+        self._tracks, self._packets = Tracks(scenario), scenario.measurement.packets_of(scenario)
         self._start, self._placed = episode.start_record(scenario), episode.placed_nodes(scenario)
 
     def reset(self, keys: npt.ArrayLike) -> State:
