@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from studies import ablations, seeds, tables, transfer
+from studies import ablations, lifetime, seeds, tables, transfer
 from studies.report import draw_curves, learning_curve, over_seeds, table
 from tests.figures import check_tables
 from wsn_env import Scenario
@@ -98,8 +98,11 @@ def test_the_pages_small_tables_are_what_is_measured(tmp_path):
 
 
 def test_every_scenario_and_shipped_policy_is_in_a_table():
+    """Lifetime-v0, where energy has no price, has a study of its own."""
     assert set(tables.COSTLY) == {name for name, scenario in named_scenarios().items() if scenario.lam}  # has a price
-    assert {f"shipped_{path.parent.name}" for path in PRETRAINED.glob("*/policy.json")} <= set(tables.TABLES)
+    priced = {path.parent.name for path in PRETRAINED.glob("*/policy.json")} & set(tables.COSTLY)
+    assert {f"shipped_{name}" for name in priced} <= set(tables.TABLES)
+    assert lifetime.LEARNED in lifetime.policies()
 
 
 def test_an_unknown_table_is_named(capsys):

@@ -205,7 +205,7 @@ def nothing_is_played(monkeypatch):
     [
         (
             "evaluate --scenario Binary-v0 --policies nearest0 ppo",
-            "policy 'ppo': none comes with the package for Binary-v0, only for Ble-v0, PreDC-v0, Rssi-v0",
+            "policy 'ppo': none comes with the package for Binary-v0, only for Ble-v0, Lifetime-v0, PreDC-v0, Rssi-v0",
         ),
         ("evaluate --policies nearest0 greedy:terms=3", "terms = 3: must be a list of list of number or None"),
         ("evaluate --policies nearest0 adaptive:order=best", "order 'best' is unknown: did you mean nearest?"),
