@@ -53,7 +53,8 @@ class PPOPolicy(ViewPolicy):
     def __repr__(self) -> str:
         """Tells it from others by what it has learned."""
         weights = b"".join(array.tobytes() for array in self._interface_and_network[1].arrays.values())
-        return f"PPOPolicy({str(self.path)!r}, weights {hashlib.sha256(weights).hexdigest()[:16]})"
+        price = "" if self._price is None else f", price {self._price}"
+        return f"PPOPolicy({str(self.path)!r}, weights {hashlib.sha256(weights).hexdigest()[:16]}{price})"
 
     def __getstate__(self) -> dict[str, Any]:
         """It takes its network along to machines that lack the file."""

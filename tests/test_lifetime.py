@@ -244,6 +244,8 @@ def test_rows_for_training_are_rewarded_and_told_at_the_price_of_their_supply():
             prices = np.where(ended, plain.lam, prices)
     with pytest.raises(ValueError, match="scarce_energy = False of PreDC-v0: must be True"):
         PricedVectorEnv(2, "PreDC-v0")
+    with pytest.raises(ValueError, match="Scenario.lam = 0.0: must be a finite number above 0"):
+        PricedVectorEnv(2, POOR)
 
 
 @pytest.mark.parametrize("rule", ["greedy", "adaptive", "ppo:of=PreDC-v0"])
@@ -314,6 +316,11 @@ def test_a_policy_with_a_price_of_its_own_acts_at_it_where_lam_is_0(halfway, tmp
     assert same(act([9.0, 0.8], dear), act(None, dear)) and not same(act([9.0, 0.8], dear), budget.act(halfway))
     half = np.where(np.arange(20) < 10, 0.0, 30.0)
     assert same(act([9.0, 0.8], half), act(None, np.where(half == 0.0, budget.prices(halfway), half)))
+    told = []
+    for price in (None, [9.0, 0.8], [9.0, 0.7]):
+        act(price, none)
+        told.append(repr(make_policy(str(path), POOR)))
+    assert len(set(told)) == 3  # kept blocks of one are not the other's
     for wrong in ([1.0], [0.0, 1.0], ["a", 1.0], 5, [1.0, -1.0]):
         with pytest.raises(ValueError, match="policy.json is not a saved policy: price"):
             act(wrong, none)

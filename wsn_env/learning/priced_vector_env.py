@@ -29,6 +29,7 @@ class PricedVectorEnv(ClusterVectorEnv):
         super().__init__(*args, **settings)
         if not self.scenario.scarce_energy:
             raise ValueError(f"scarce_energy = False of {self.scenario.name}: must be True for a price of scarcity")
+        check_quantity("Scenario", "lam", self.scenario.lam_range[0], above=0)  # the price that is steered
         check_quantity("PricedVectorEnv", "steering", steering, at_least=0, at_most=100)
         self._steering = steering
         self._price = np.zeros(self.num_envs)
