@@ -17,8 +17,9 @@ from wsn_env.simulation.view import View
 class PreDC(ViewPolicy):
     """Keep the cluster while the prediction is sharp and the cluster would detect there; else form a new one.
 
-    The new head is the living node nearest to the prediction that has the energy for a handover and one period; its
-    neighbours join in order of detection probability until the joint probability exceeds theta.
+    The new head is the living node nearest to the prediction that has the energy for a handover and one period, and
+    the residual energy `least_left`; its neighbours join in order of detection probability until the joint probability
+    exceeds theta. Where no node that could detect the target has so much, all count.
 
     Differs from the paper: as printed only E >= Phi0 ends a cluster, so that one that the target has left keeps
     waiting; here the joint detection probability at the prediction must also stay at `keep_theta` or above.
@@ -27,12 +28,14 @@ class PreDC(ViewPolicy):
     theta: float = 0.9  # theta_d: joint detection probability wanted
     keep_theta: float | None = None  # joint probability that keeps a cluster; None: theta; 0: as printed
     phi0_m: float = 2.0  # Phi0: prediction sd from which the cluster is formed anew [m]
+    least_left: float = 0.0  # share of a full battery that a node of a new cluster must have left
     sees_lam = False
 
     def __post_init__(self) -> None:
         check_quantity("PreDC", "theta", self.theta, at_least=0, at_most=1)
         check_quantity("PreDC", "keep_theta", self.keep_theta, at_least=0, at_most=1, optional=True)
         check_quantity("PreDC", "phi0_m", self.phi0_m, at_least=0)
+        check_quantity("PreDC", "least_left", self.least_left, at_least=0, at_most=1)
 
     def act(self, view: View) -> Cluster:
         """Keep or form, for every row."""
@@ -45,19 +48,21 @@ class PreDC(ViewPolicy):
 
     def _form(self, view: View, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Heads (B,) and members (B, S) of new clusters."""
-        able = view.battery >= self._head_energy_j(p)[:, None]
-        able = np.where(np.any(able, axis=1, keepdims=True), able, view.alive)
+        rested = view.alive & (view.battery >= self.least_left * view.full_j[:, None])
+        rested = np.where(np.any(rested & (p > 0), axis=1, keepdims=True), rested, view.alive)
+        able = rested & (view.battery >= self._head_energy_j(p)[:, None])
+        able = np.where(np.any(able, axis=1, keepdims=True), able, rested)
         head = np.where(able.any(axis=1), np.where(able, view.distance, np.inf).argmin(axis=1), -1)
 
         # Nearest first is by probability first; the head goes before all.
         rank = view.distance.copy()
         living = np.flatnonzero(head >= 0)
         rank[living, head[living]] = -1.0
-        order = np.argsort(np.where(view.alive, rank, np.inf), axis=1, kind="stable")
+        order = np.argsort(np.where(rested, rank, np.inf), axis=1, kind="stable")
         sorted_p = np.take_along_axis(p, order, axis=1)
         before = 1.0 - np.cumprod(1.0 - sorted_p, axis=1)
         before = np.concatenate([np.zeros((len(p), 1)), before[:, :-1]], axis=1)
-        joins = (sorted_p > 0) & (before <= self.theta)
+        joins = (sorted_p > 0) & (before <= self.theta) & np.take_along_axis(rested, order, axis=1)
         chosen = np.zeros_like(joins)
         np.put_along_axis(chosen, order, joins, axis=1)
         return head, chosen

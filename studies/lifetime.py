@@ -33,7 +33,7 @@ def _steered(label: str) -> str:
     return f"{label}, {STEERED[label].replace('=', ' ').replace(',', ', ')}"
 
 
-PLAIN = ("static_cluster", "pre_dc", "nearest0", "nearest1", "nearest2")
+PLAIN = ("static_cluster", "pre_dc", "pre_dc:least_left=0.2", "nearest0", "nearest1", "nearest2")
 RIVALS = {  # of the learned policy, each the best of its kind in hindsight, at every battery anew
     "the best of the rules at no price of their own": PLAIN,
     "greedy at its best fixed price": tuple(f"greedy, price {price}" for price in PRICES),

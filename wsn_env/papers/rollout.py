@@ -51,6 +51,7 @@ class Record:
     detections: np.ndarray  # (R, K) nodes that had something to report
     delivered: np.ndarray  # (R, K) reports that the head had
     handover: np.ndarray  # (R, K) bool
+    alive: np.ndarray  # (R, K) living nodes after the period
 
     @property
     def report_mj(self) -> np.ndarray:
@@ -123,9 +124,15 @@ def _play_block(world: World, policy: Policy, runs: range, tick: Callable[[], No
     periods = []
     for _, outcome in episodes(policy, world, [FIRST_SEED + run for run in runs]):
         energy, reports = (outcome.energy_mj, 1e3 * outcome.energy_j), (outcome.detections, outcome.delivered)
-        periods.append((outcome.target_m, outcome.estimate_m, *energy, *reports, outcome.handover))
+        periods.append((outcome.target_m, outcome.estimate_m, *energy, *reports, outcome.handover, outcome.alive))
         tick()
     return tuple(np.stack(arrays, axis=1) for arrays in zip(*periods, strict=True))
+
+
+def periods_until_dead(record: Record, nodes: int, share: float) -> np.ndarray:
+    """(R,) the period in which this share of the nodes has died; all of them where it never happens."""
+    dead = record.alive <= (1 - share) * nodes
+    return np.where(dead.any(axis=1), dead.argmax(axis=1) + 1, dead.shape[1])
 
 
 def pooled_rms(square: np.ndarray) -> Measured:

@@ -22,6 +22,7 @@ of periods.
 **Faults.** One misread bit in a thousand makes false boundary nodes that ruin least squares; a gate keeps them out. A
 lost report leaves the bitmap wrong until the node changes again; a refresh in every so many periods heals it, at the
 price of every node's report.
+**Lifetime.** Batteries of 5 mJ and random waypoints at the same speed, for 2,000 periods: when nodes have died.
 **Unequal radii.** Eqs. 3-8 need no R where all nodes have the same. Where each has its own, a tracker that knows them
 puts their squares into the equations; one that does not errs.
 """

@@ -8,8 +8,8 @@ import numpy as np
 
 from wsn_env.evaluation.intervals import Measured
 from wsn_env.evaluation.progress import Progress
-from wsn_env.papers.binary.systems import FAULTS, PERIODS_S, RADII, SETTINGS, Setting
-from wsn_env.papers.rollout import Record, play_all, pooled_rms
+from wsn_env.papers.binary.systems import FAULTS, LIFETIMES, PERIODS_S, RADII, SETTINGS, Setting, lifetime_trial
+from wsn_env.papers.rollout import Record, periods_until_dead, play_all, pooled_rms
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,6 +18,7 @@ class Results:
 
     runs: int
     records: dict[Setting, Record]
+    lifetimes: dict[str, Record]  # by system
 
     def error_m(self, setting: Setting) -> np.ndarray:
         """(R, K') error in each steady period."""
@@ -47,6 +48,11 @@ class Results:
     def energy_mj(self, setting: Setting) -> np.ndarray:
         """(R,) mean energy of a period of each run."""
         return self.records[setting].energy_mj[:, setting.steady].mean(axis=1)
+
+    def dead_at(self, system: str, share: float) -> np.ndarray:
+        """(R,) the period in which this share of the nodes has died."""
+        nodes = lifetime_trial(system, self.runs).scenario.field.nodes
+        return periods_until_dead(self.lifetimes[system], nodes, share)
 
     def crossing_s(self, system: str) -> Measured:
         """The sampling period from which the centroid has the lower RMS; NaN: none up to the longest."""
@@ -78,5 +84,10 @@ def first_crossing(excess: np.ndarray) -> float:
 def play_paper(runs: int, progress: Progress) -> Results:
     """Play everything; what several tables share is played once."""
     trials = {setting: setting.trial(runs) for setting in (*SETTINGS, *FAULTS, *RADII)}
-    records = play_all(trials.values(), progress)
-    return Results(runs, {setting: records[trial] for setting, trial in trials.items()})
+    lives = {system: lifetime_trial(system, runs) for system in LIFETIMES}
+    records = play_all([*trials.values(), *lives.values()], progress)
+    return Results(
+        runs,
+        {setting: records[trial] for setting, trial in trials.items()},
+        {system: records[trial] for system, trial in lives.items()},
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from math import floor, pi
+from math import floor, hypot, pi
 from typing import Any, Literal
 
 import numpy as np
@@ -116,6 +116,15 @@ class Setting:
         if self.spread == 0:
             return Detection(radius_m=self.radius_m, softness=1e-6, ceiling=1.0)
         return UnequalRadii(self.radius_m, self.spread, self.knows == "each radius")
+
+
+LIFETIME: dict[str, Any] = dict(motion="waypoint", speed_ms=hypot(*VELOCITY_MS), periods=2000, battery_j=0.005)
+LIFETIMES = ("paper", "centroid")
+
+
+def lifetime_trial(system: str, runs: int) -> Trial:
+    """With small batteries and a target that never leaves; who reports does not hang on the tracker."""
+    return Trial("all", Setting(system).trial(runs).scenario.override(**LIFETIME), runs)
 
 
 def vary(system: str, field: str, values: Iterable[float]) -> list[Setting]:

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from wsn_env.evaluation.intervals import standard_error
+from wsn_env.evaluation.intervals import Measured, standard_error
 from wsn_env.papers.claim import Claim, judge_claim
 from wsn_env.papers.rollout import Record, exceeds
 from wsn_env.papers.underwater.expected import HARMLESS, KEEPS, LOSES, rmse_ratio
 from wsn_env.papers.underwater.systems import (
     HANDOVERS,
     HYSTERESES_DB,
+    LIFETIMES_DB,
     PARTICLES,
     RESAMPLING_NOISES,
     ROUGH,
@@ -51,6 +52,7 @@ def judge_additions(results: Results) -> list[Claim]:
         _silence(results),
         _knee(results),
         _hysteresis(results),
+        _lifetime(results),
     ]
 
 
@@ -207,3 +209,14 @@ def _hysteresis(results: Results) -> Claim:
     )
     what = "A head that stays until another is 3 dB stronger halves the handovers at the same error"
     return Claim(what, "half, within 0.1", ours, judge_claim(good, good))
+
+
+def _lifetime(results: Results) -> Claim:
+    longer, parts = [], []
+    for share, what in ((1e-9, "the first node"), (0.1, "a tenth"), (0.5, "half of them")):
+        base, calm = (results.dead_at(db, share) for db in LIFETIMES_DB)
+        longer.append(exceeds(calm, base))
+        parts.append(f"{what} after {Measured.mean(calm)} against {Measured.mean(base)} periods")
+    ours = f"with batteries of 30 J and a target that never leaves, dead: {', '.join(parts)}"
+    what = "With 3 dB of hysteresis the network lasts longer than without"
+    return Claim(what, "-", ours, judge_claim(all(longer), longer[-1]))

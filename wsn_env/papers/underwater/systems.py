@@ -11,7 +11,7 @@ import numpy as np
 from wsn_env.compiled import draws
 from wsn_env.evaluation.progress import Progress
 from wsn_env.evaluation.rollout import FIRST_SEED
-from wsn_env.papers.rollout import Record, Trial, play_all
+from wsn_env.papers.rollout import Record, Trial, periods_until_dead, play_all
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World
@@ -33,6 +33,8 @@ STARTS: dict[str, dict[str, Any]] = {  # where the first head comes from
     "nearest to a known start": {},
     "strongest signal of a search": {"start": "search", "rest_sd_ms": SPEED_MS / sqrt(2)},
 }
+LIFETIME: dict[str, Any] = dict(motion="waypoint", speed_ms=SPEED_MS, filter_q=0.1, periods=1000, battery_j=30.0)
+LIFETIMES_DB = (0.0, 3.0)
 LEAVING_PERIODS = 150  # within which every target leaves
 LOST_M, LOST_PERIODS = 100.0, 10  # a run is lost when its mean error over the last ten periods is larger
 
@@ -81,6 +83,12 @@ def hysteresis_trial(hysteresis_db: float, runs: int) -> Trial:
     return _trial(scenario, runs, hysteresis_db)
 
 
+def lifetime_trial(hysteresis_db: float, runs: int) -> Trial:
+    """The same with small batteries and a target that never leaves."""
+    reading: dict[str, Any] = dict(silent_information=True, redraw_on_handover=True)
+    return _trial(scenario_as_read(MIDDLE, **reading).override(**LIFETIME), runs, hysteresis_db)
+
+
 def start_trial(noise: float, start: str, runs: int) -> Trial:
     """A first head, one of STARTS."""
     return _trial(scenario_as_read(noise, silent_information=True, redraw_on_handover=True, **STARTS[start]), runs)
@@ -119,6 +127,11 @@ class Results:
         """A head with so much hysteresis."""
         return self.records[hysteresis_trial(hysteresis_db, self.runs)]
 
+    def dead_at(self, hysteresis_db: float, share: float) -> np.ndarray:
+        """(R,) the period in which this share of the nodes has died, with so much hysteresis."""
+        trial = lifetime_trial(hysteresis_db, self.runs)
+        return periods_until_dead(self.records[trial], trial.scenario.field.nodes, share)
+
     def start(self, noise: float, start: str) -> Record:
         """A first head."""
         return self.records[start_trial(noise, start, self.runs)]
@@ -141,6 +154,7 @@ def play_system(runs: int, progress: Progress) -> Results:
         threshold_trial(threshold_db, silent, runs) for threshold_db in THRESHOLDS_DB for silent in (False, True)
     ]
     trials += [hysteresis_trial(hysteresis_db, runs) for hysteresis_db in HYSTERESES_DB]
+    trials += [lifetime_trial(hysteresis_db, runs) for hysteresis_db in LIFETIMES_DB]
     trials += [start_trial(noise, start, runs) for noise in NOISES for start in STARTS]
     trials += [leaving_trial(noise, resampling, runs) for noise in NOISES for resampling in RESAMPLINGS]
     heads = {(noise, start): first_heads(noise, start, runs) for noise in NOISES for start in STARTS}
