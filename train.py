@@ -79,7 +79,8 @@ class Training:
     set: list[str] = field(default_factory=list)
     """Scenario quantities, as name=value: nodes=400 particles=1000."""
     vary: list[str] | None = None
-    """Further scenarios to train in, each this one with some quantities changed: nodes=81 motion=turns,particles=1000.
+    """Further scenarios to train in, each this one with some quantities changed: nodes=81 motion=turns,particles=1000
+    nodes=81,faults=stuck,share=0.1 (faults last).
     The rows are divided evenly among all. Left out: fewer and twice as many nodes, where they are drawn."""
     action: Literal["menu", "subset"] = "menu"
     """What it chooses from."""
@@ -297,9 +298,16 @@ def learn_on_ray(settings: Training, scenario: Scenario, interface: Settings, fo
         return training.actor_network()
 
 
+def varied(text: str) -> dict[str, Any]:
+    """Quantities of a scenario to train in: "nodes=81,motion=turns"; faults are last: "nodes=81,faults=stuck+late"."""
+    others, faulty, faults = text.partition("faults=")
+    quantities = parse_overrides(filter(None, others.split(",")))
+    return quantities | ({"faults": faults} if faulty else {})
+
+
 def make_envs(settings: Training, scenario: Scenario, interface: Settings, rows: int) -> ConcatVectorEnv:
     """The rows, divided among the scenarios."""
-    scenarios = [scenario, *(scenario.override(**parse_overrides(text.split(","))) for text in settings.vary or ())]
+    scenarios = [scenario, *(scenario.override(**varied(text)) for text in settings.vary or ())]
     shares = np.diff(np.arange(len(scenarios) + 1) * rows // len(scenarios))
     parts = []
     for one, share in zip(scenarios, shares):

@@ -24,12 +24,13 @@ from wsn_env.simulation.world import World
 
 
 def imagined_world(scenario: Scenario, periods: int, particles: int) -> World:
-    """The scenario with another horizon and a cheap filter at the head; prices and noises are the same.
+    """The scenario with another horizon, a cheap filter at the head, and no faults, of which the network knows nothing;
+    prices and noises are the same.
 
     Args:
         particles: of a particle filter; 0: a `GaussianTracker`, which cannot read binary sensors.
     """
-    changes: dict[str, Any] = dict(periods=periods, motion="straight", filter_q=scenario.filter_q)
+    changes: dict[str, Any] = dict(periods=periods, motion="straight", filter_q=scenario.filter_q, faults=None)
     changes |= dict(tracker="particle", particles=max(particles, 2), gate_m=None)
     if scenario.radio.handover == "particles":  # as many as there really are
         changes |= dict(handover="estimate", handover_bits=scenario.handover_bits)

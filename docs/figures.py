@@ -40,6 +40,13 @@ RULES = {  # beside adaptive, greedy and static_cluster
     "Underwater-v0": [*SIZES, "adaptive_informed", "strongest_signal"],
 }
 
+FAULTS = [  # that a policy is trained with, beside those of none in fewer and in more nodes
+    *("nodes=75", "nodes=450", "faults=failures,share=0.3", "faults=regional_failure,region_m=25"),
+    *("faults=stuck,share=0.1", "faults=biased,bias_m=5", "faults=misplaced,position_sd_m=1"),
+    *("faults=false_alarms,probability=0.05", "faults=missed,probability=0.2", "faults=bursts,to_bad=0.05"),
+    *("faults=late,probability=0.2", "faults=stops,stop_s=20", "faults=excursion,outside_m=10"),
+]
+
 
 def trainings(scenario: str) -> list[list[str]]:
     """Of the policies that the pages compare."""
@@ -80,6 +87,13 @@ TRAINING_MAKERS: dict[str, list[list[str]]] = {
             *trainings(name),
             ["-m", "studies.transfer", "--scenario", name, *trained(name), "--out", "{out}"],
         )
+    ],
+    "faults": [
+        *(
+            [*"train.py --resume --scenario PreDC-v0 --episodes 0 --runs".split(), RUNS, *more, "--vary", *FAULTS]
+            for more in (["--name", "ppo_faults"], ["--name", "ppo_faults_error", "--reward", "error"])
+        ),
+        ["-m", "studies.faults", "--trained", f"{RUNS}/ppo_faults", f"{RUNS}/ppo_faults_error", "--out", "{out}"],
     ],
     "ablations": [["-m", "studies.ablations", "--scenario", "Rssi-v0", "--out", "{out}"]],
     "algorithms": [["-m", "studies.algorithms", "--scenario", "Rssi-v0", "--out", "{out}"]],

@@ -41,6 +41,7 @@ from wsn_env.evaluation.policies import GROUP, named_policies, policy_names
 from wsn_env.learning.concat_vector_env import ConcatVectorEnv
 from wsn_env.learning.network import PolicyNetwork
 from wsn_env.learning.training_reward import TrainingReward
+from wsn_env.models.library import FAULTS
 from wsn_env.models.recordings.dataset import read_dataset, read_track
 from wsn_env.papers import reproduce
 from wsn_env.reports.pages.replay_page import replay
@@ -238,7 +239,8 @@ def test_every_action(name):
 def test_every_quantity(tmp_path):
     """Of the preset that has it, or of the kind."""
     presets = named_scenarios().values()
-    kinds = [(role, kind, made) for role, registry in BY_NAME.items() for kind, made in registry.kinds.items()]
+    registries = {**BY_NAME, "faults": FAULTS}
+    kinds = [(role, kind, made) for role, registry in registries.items() for kind, made in registry.kinds.items()]
     (tmp_path / "track.csv").write_text("t,x,y\n0,1,1\n1,2,2\n2,3,3\n")
     needed = {"span_m": {"tracks": (str(tmp_path / "track.csv"),)}}
     calls = {}

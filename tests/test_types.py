@@ -15,14 +15,16 @@ from wsn_env.envs.merit import ORDERS
 from wsn_env.envs.observations import OBSERVATIONS, ObservationName
 from wsn_env.envs.rendering.camera import RENDER_MODES, RenderMode
 from wsn_env.envs.rewards import REWARDS, RewardName
+from wsn_env.models.fault.base import Fault
 from wsn_env.models.kinds import Kind
+from wsn_env.models.library import FAULTS
 from wsn_env.models.measurement.base import Order
 from wsn_env.scenario.quantities import Quantities
 from wsn_env.scenario.scenario import BY_NAME, Scenario
 from wsn_env.scenario.tracking import Tracking
 
 ROOT = Path(__file__).parents[1]
-KINDS = [kind for registry in BY_NAME.values() for kind in registry.kinds.values()]
+KINDS = [kind for registry in (*BY_NAME.values(), FAULTS) for kind in registry.kinds.values()]
 SECTIONS = [type(Scenario().field), Tracking, *KINDS]
 
 PROGRAM = """\
@@ -66,6 +68,7 @@ def test_quantities_have_the_types_of_their_fields():
             expected.setdefault(name, set()).update(alternatives(hint))
     for name in BY_NAME:
         expected[name].add(str)
+    expected["faults"] |= {list[Fault | str], Fault, str, type(None)}
     assert {name: alternatives(hint) for name, hint in known.items()} == expected
 
 

@@ -9,12 +9,13 @@ from wsn_env import Cluster, Scenario, View, World
 from wsn_env.compiled.arrays import Arrays
 from wsn_env.envs.expectations import REPORTS, Expectations
 from wsn_env.envs.merit import PositionCov, gain
-from wsn_env.models.library import MEASUREMENTS
+from wsn_env.models.library import FAULTS, MEASUREMENTS
 from wsn_env.models.state import Grid, Knowledge
 from wsn_env.scenario.tracking import BOUNDARY_TRACKERS, reads
 
 TRACKERS = ("particle", "particle", "particle", "ekf", "ukf", "ickf", "snapshot", *BOUNDARY_TRACKERS)
 MOTIONS = ["crossing", "straight", "sine", "circle", "turns", "waypoint"]
+OF_SENSING = {name for name, kind in FAULTS.kinds.items() if kind.of_sensing}
 MODEM_J = 5000.0  # a modem's packets cost so many times a radio's
 SOURCE_DB = 120.0
 KEYS = st.integers(0, 2**64 - 1)
@@ -23,8 +24,10 @@ HAND_WRITTEN += "adaptive adaptive_informed greedy informed2".split()
 
 
 @st.composite
-def scenarios(draw, trackers=TRACKERS, modem_hops_m=(30.0, 70.0, 250.0), **fixed):
+def scenarios(draw, trackers=TRACKERS, modem_hops_m=(30.0, 70.0, 250.0), no_faults=(), **fixed):
     """Small scenarios of every kind: lossy, short of energy, lost from the start, without any noise in the filter.
+
+    Half of them have faults, but for some (`no_faults`).
 
     All with sonars and some others have modems, with batteries (given ones, too) MODEM_J times as large.
     """
@@ -70,6 +73,10 @@ def scenarios(draw, trackers=TRACKERS, modem_hops_m=(30.0, 70.0, 250.0), **fixed
         overrides["gate_m"] = draw(st.sampled_from([None, None, 2.0, 20.0]))
     if draw(st.booleans()):
         overrides |= dict(layout="grid", nodes=isqrt(overrides["nodes"]) ** 2, jitter=draw(st.sampled_from([0.25, 0])))
+    if overrides.get("gate_sds") is not None:
+        overrides |= dict(fusion="joint", silent_information=False)
+    faults = sorted(FAULTS.kinds.keys() - set(no_faults) - (OF_SENSING if measurement == "beacon" else set()))
+    overrides["faults"] = draw(st.one_of(st.just([]), st.lists(st.sampled_from(faults), max_size=3)))
     if isinstance(overrides.get("at_1m_db"), tuple):
         overrides["at_1m_db"] = overrides["at_1m_db"][: overrides["nodes"]]
     overrides |= fixed
@@ -126,7 +133,12 @@ def beacon(draw, nodes):
 @st.composite
 def cloud(draw, measurement):
     """What the particle filter alone has; a bitmap tells of silence anyhow."""
-    return dict(
+    robust = dict(
+        gate_sds=draw(st.sampled_from([None, None, 3.0])),
+        outlier_share=draw(st.sampled_from([0.0, 0.0, 0.1])),
+        node_sd_m=draw(st.sampled_from([0.0, 0.0, 2.0])),
+    )
+    return (robust if MEASUREMENTS.kinds[measurement]().independent else {}) | dict(
         silent_information=measurement != "binary" and draw(st.sampled_from([False, False, True])),
         resampling=draw(st.sampled_from(["systematic", "spread", "common_spread"])),
         spread_scale=draw(st.sampled_from([0.5, 0.0, 3.0])),

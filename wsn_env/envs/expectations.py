@@ -174,7 +174,9 @@ def _expect_node(known, b, node, depth, c, e):
         lines = linearise(c.measurement, place, target)
         e.numbers = min(len(lines), NUMBERS)
         for k in range(e.numbers):
-            e.slope_x[k], e.slope_y[k], e.variance[k] = lines[k].slope_x, lines[k].slope_y, lines[k].variance
+            sx, sy = lines[k].slope_x, lines[k].slope_y
+            e.slope_x[k], e.slope_y[k] = sx, sy
+            e.variance[k] = lines[k].variance + c.tracking.node_sd_m**2 * (sx * sx + sy * sy)
     if depth >= REPORTS_AHEAD:
         t = AHEAD * c.period_s
         xx = p[0, 0] + t * (2.0 * p[0, 1] + t * p[1, 1])

@@ -41,7 +41,7 @@ class KeptBlocks:
         self._path = None if folder is None else Path(folder) / BLOCKS_FILE
         if self._path is None:
             return
-        of_classes = {type(each).__module__ for each in (*policies, *vars(scenario).values())}
+        of_classes = {type(each).__module__ for each in (*policies, *scenario.kinds)}
         self._modules = sorted(name for name in of_classes if name.partition(".")[0] not in ("builtins", "wsn_env"))
         for name in self._modules:
             watch(name)

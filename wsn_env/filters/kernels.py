@@ -15,6 +15,7 @@ from wsn_env.compiled.elementary import F, exp32, f32_bits, f32_from_bits
 from wsn_env.compiled.kernels import kernel, lean_kernel, lean_piece, piece
 from wsn_env.filters.likelihood import weigh_awake
 from wsn_env.filters.resampling import REACH, correlated, lower_root, resample, spread_copies, spread_copies_alike
+from wsn_env.filters.robust import weigh_robustly
 from wsn_env.filters.walkers import scatter_walkers, walk
 from wsn_env.models.measurement.base import AtHead, weigh_period
 from wsn_env.models.measurement.beacon_levels import draw_biases
@@ -222,7 +223,10 @@ def filter_row(key: Any, period: int, head: AtHead, c: Any, maps: np.ndarray, sc
         walk(draws.stream(key, period, draws.PROCESS), x, c.tracking)
     else:
         predict(draws.stream(key, period, draws.PROCESS), x, c.period_s, c.tracking.q)
-    weigh_period(c.measurement, head, c, maps, weights)
+    if c.tracking.robust:
+        weigh_robustly(head, c, weights)
+    else:
+        weigh_period(c.measurement, head, c, maps, weights)
     if c.tracking.silent_information:
         weigh_awake(x, log_weights, network, reports.node[b, :count], b, c)
     normalise(log_weights, weights)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import is_dataclass
 from pathlib import Path
 from shutil import rmtree
 from typing import Any
@@ -59,7 +58,7 @@ def facts_of(settings: dict[str, Any], scenario: Scenario, script: Path) -> dict
         script: that trains.
     """
     decisive = {name: value for name, value in settings.items() if name not in (*FREE, "name")}
-    kinds = {type(part).__module__ for part in vars(scenario).values() if is_dataclass(part)}
+    kinds = {type(kind).__module__ for kind in scenario.kinds}
     own = [file for kind in kinds if not kind.startswith("wsn_env.") for file in sources_of(kind)]
     contents = {file: file_digest(file) for file in (*own, *settings["tracks"])}
     sources = versions() | {"sources of wsn_env": sources_digest(), script.name: file_digest(script)}

@@ -86,6 +86,13 @@ def fill_constants(row: np.ndarray, kind: Kind, scenario: Scenario) -> None:
         row[name] = value
 
 
+def made_constants(kind: Kind, scenario: Scenario) -> np.ndarray:
+    """A kind's constants, an array of one."""
+    made = np.zeros(1, constants_type(kind, scenario))
+    fill_constants(made, kind, scenario)
+    return made
+
+
 def _number_type(value) -> str:
     return "i8" if isinstance(value, (bool, int, np.integer)) else "f8"
 

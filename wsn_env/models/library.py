@@ -1,6 +1,7 @@
 """Every shipped kind by name; files in these packages are found by themselves."""
 
 from wsn_env.models.detection.base import DetectionRule
+from wsn_env.models.fault.base import Fault
 from wsn_env.models.kinds import Registry
 from wsn_env.models.measurement.base import Measurement
 from wsn_env.models.motion.base import Motion
@@ -10,3 +11,4 @@ MEASUREMENTS = Registry(Measurement, "wsn_env.models.measurement")
 DETECTIONS = Registry(DetectionRule, "wsn_env.models.detection")
 MOTIONS = Registry(Motion, "wsn_env.models.motion")
 RADIOS = Registry(Link, "wsn_env.models.radio")
+FAULTS = Registry(Fault, "wsn_env.models.fault")

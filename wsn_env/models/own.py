@@ -191,7 +191,7 @@ def _is_own(file: str) -> bool:
 def kind_and_settings(registry: Registry, role: str, text: str) -> tuple[type[Kind], dict[str, Any]]:
     """The kind that a text names, and its settings: "rssi", "rssi,noise_db=2", "mine.py:MyBearing,sd_deg=3"."""
     name, comma, rest = text.partition(",")
-    settings = parse_overrides(rest.split(",")) if comma else {}
+    settings = parse_overrides(each.strip() for each in rest.split(",")) if comma else {}
     file, own, class_name = name.partition(".py:")
     if own:
         kind = class_in(Path(f"{file}.py"), class_name)

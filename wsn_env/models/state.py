@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from wsn_env.compiled.arrays import Arrays, array, opener, part, record
 from wsn_env.compiled.kernels import inline_piece
+from wsn_env.models.fault.base import CONDITION
 from wsn_env.models.measurement.beacon_levels import RECEIVER
 from wsn_env.models.quantity import short
 
@@ -148,6 +149,7 @@ class State(Arrays):
     sensed: np.ndarray = array(np.int8, "rows", "states")  # what each node sensed last, known to itself alone
     residual_j: np.ndarray = array(float, "rows", "nodes")  # energy left in each node: it is alive while it has any
     living: np.ndarray = array(np.int64, "rows")  # how many are
+    condition: np.ndarray = array(CONDITION, "rows", "faulty")  # what is wrong with each node; (B, 0) without faults
     life: np.ndarray = array(LIFE, "rows")  # how the episode has gone so far
     recent_m: np.ndarray = array(float, "rows", WINDOW)  # errors of the last periods, as they count
     ledger: Ledger = part(Ledger)

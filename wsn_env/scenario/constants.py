@@ -29,6 +29,10 @@ TRACKING = record(
         ("gate_m", "f8"),  # inf: none
         ("pooled", "i8"),
         ("silent_information", "i8"),
+        ("robust", "i8"),  # 1: any of the following matters
+        ("gate_sds", "f8"),  # inf: none
+        ("outlier_share", "f8"),
+        ("node_sd_m", "f8"),
         ("resample_below", "f8"),
         ("spread_scale", "f8"),  # 0: systematic resampling alone
         ("spread_alike", "i8"),  # 1: along one direction for all parents
@@ -115,6 +119,10 @@ def _constants(scenario: Scenario) -> np.ndarray:
         gate_m=math.inf if t.gate_m is None else t.gate_m,
         pooled=t.fusion == "pooled",
         silent_information=t.silent_information,
+        robust=t.robust,
+        gate_sds=math.inf if t.gate_sds is None else t.gate_sds,
+        outlier_share=t.outlier_share,
+        node_sd_m=t.node_sd_m,
         resample_below=t.resample_below,
         spread_scale=0.0 if t.resampling == "systematic" else t.spread_scale,
         spread_alike=t.resampling == "common_spread",

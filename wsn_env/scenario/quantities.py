@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Literal, TypedDict
 
 from wsn_env.models.detection.base import DetectionRule
+from wsn_env.models.fault.base import Fault
 from wsn_env.models.field import Field
 from wsn_env.models.measurement.base import Measurement
 from wsn_env.models.motion.base import Motion
@@ -39,6 +40,7 @@ class Quantities(TypedDict, total=False):
     measurement: Measurement | str
     radio: Link | str
     tracking: Tracking
+    faults: tuple[Fault, ...] | list[Fault | str] | Fault | str | None
     # the field
     nodes: int
     side_m: float
@@ -138,6 +140,9 @@ class Quantities(TypedDict, total=False):
     particles: int
     fusion: Literal["joint", "pooled"]
     silent_information: bool
+    gate_sds: float | None
+    outlier_share: float
+    node_sd_m: float
     resample_below: float
     resampling: Literal["systematic", "spread", "common_spread"]
     spread_scale: float
@@ -154,3 +159,15 @@ class Quantities(TypedDict, total=False):
     search_gap: int
     width_search: Literal["golden", "foa"]
     training_seed: int
+    # faults
+    share: float
+    region_m: float
+    bias_m: float
+    position_sd_m: float
+    probability: float
+    to_bad: float
+    to_good: float
+    bad_success: float
+    stops: int
+    stop_s: float
+    outside_m: float

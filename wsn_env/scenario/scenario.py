@@ -12,14 +12,14 @@ import numpy as np
 
 from wsn_env.models.detection.base import DetectionRule
 from wsn_env.models.detection.radius import Detection
+from wsn_env.models.fault.base import Fault
 from wsn_env.models.field import Field
 from wsn_env.models.kinds import Kind, Registry
-from wsn_env.models.library import DETECTIONS, MEASUREMENTS, MOTIONS, RADIOS
+from wsn_env.models.library import DETECTIONS, FAULTS, MEASUREMENTS, MOTIONS, RADIOS
 from wsn_env.models.measurement.base import Measurement
 from wsn_env.models.measurement.position import Position
 from wsn_env.models.motion.base import Motion
 from wsn_env.models.motion.crossing import Crossing
-from wsn_env.models.own import kind_and_settings
 from wsn_env.models.quantity import (
     ScenarioError,
     Section,
@@ -33,8 +33,9 @@ from wsn_env.models.quantity import (
 from wsn_env.models.radio.base import Link
 from wsn_env.models.radio.radio import Radio
 from wsn_env.models.recordings.calibration_file import read_quantities
+from wsn_env.scenario.named import faults_named, kind_named
 from wsn_env.scenario.quantities import Quantities
-from wsn_env.scenario.tracking import BOUNDARY_TRACKERS, Tracking, reads
+from wsn_env.scenario.tracking import BOUNDARY_TRACKERS, ROBUST, Tracking, reads
 
 PARTS: dict[str, type] = {
     "name": str,
@@ -99,9 +100,11 @@ class Scenario(Section):
     measurement: Measurement = Position()
     radio: Link = Radio()
     tracking: Tracking = Tracking()
+    faults: tuple[Fault, ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        self._take_faults()
         for name, part in PARTS.items():
             value = getattr(self, name)
             if not isinstance(value, part):
@@ -115,9 +118,23 @@ class Scenario(Section):
         if self.ends_outside and self.unscored:
             raise ScenarioError(f"Scenario.unscored = {self.unscored}: must be 0 with ends_outside = True")
         self._check_tracker()
-        for kind in (self.detection, self.measurement, self.radio):
+        self._check_robust()
+        checked: tuple[Any, ...] = self.detection, self.measurement, self.radio, *self.faults
+        for kind in checked:
             kind.check(self)
         self.motion.check_measurement(self.measurement)
+
+    def _take_faults(self) -> None:
+        """One fault, or a list of them, is a tuple."""
+        given: Any = self.faults
+        faults = (given,) if isinstance(given, Fault) else tuple(given) if isinstance(given, (list, tuple)) else None
+        wrong = [given] if faults is None else [each for each in faults if not isinstance(each, Fault)]
+        if wrong:
+            kinds = ", ".join(kind.__name__ for kind in FAULTS.kinds.values())
+            raise ScenarioError(f"Scenario.faults = {short(repr(wrong[0]))}: must be faults: {kinds} or your own")
+        for fault in faults or ():
+            fault.check_functions()
+        object.__setattr__(self, "faults", faults)
 
     def _check_tracker(self) -> None:
         name, kind = self.tracking.tracker, type(self.measurement)
@@ -134,6 +151,7 @@ class Scenario(Section):
                 raise ScenarioError(f"Binary.reports = {reports!r}: allowed is 'changes' with the tracker {name!r}")
         needless = {
             "silent_information": name != "particle",
+            **dict.fromkeys(ROBUST, name != "particle"),
             "resampling": name != "particle",
             "redraw_on_handover": name != "particle",
             "velocity_s": name != "particle",
@@ -145,6 +163,24 @@ class Scenario(Section):
             given = ", ".join(f"Tracking.{item} = {getattr(self.tracking, item)!r}" for item in wrong)
             allowed = ", ".join(repr(usual[item]) for item in wrong)
             raise ScenarioError(f"{given}: allowed is {allowed} with the tracker {name!r}, which makes no use of it")
+
+    def _check_robust(self) -> None:
+        """What reckons with wrong reports weighs them one by one; a gate leaves some out."""
+        tracking, kind = self.tracking, type(self.measurement)
+        if tracking.robust and kind.weigh_period is not Measurement.weigh_period:
+            given = ", ".join(f"Tracking.{name} = {getattr(tracking, name)}" for name in ROBUST)
+            raise ScenarioError(f"{given}: allowed is None, 0, 0 with {kind.__name__}, which weighs a period at once")
+        for name, needed in (("fusion", "joint"), ("silent_information", False)):
+            given = getattr(tracking, name)
+            if tracking.gate_sds is not None and given != needed:
+                raise ScenarioError(
+                    f"Tracking.{name} = {given!r}: allowed is {needed!r} with gate_sds, which leaves reports out"
+                )
+
+    @property
+    def kinds(self) -> tuple[Kind, ...]:
+        """Of everything that there are several kinds of."""
+        return self.motion, self.detection, self.measurement, self.radio, *self.faults
 
     @property
     def lam_range(self) -> tuple[float, float]:
@@ -243,8 +279,9 @@ class Scenario(Section):
         """A copy with some quantities changed, whatever section they stand in.
 
         Sections are given whole or, where there are several kinds, by name: `override(nodes=400, motion="sine",
-        amplitude_m=20, tracker="ekf")`. An unknown keyword raises and suggests. `calibration=FILE` stands for all
-        quantities that `wsn calibrate` wrote into the file. A replay without `periods` is as long as its recording.
+        amplitude_m=20, tracker="ekf")`. So are faults, of which several are joined: `faults="stuck,share=0.3+late"`.
+        An unknown keyword raises and suggests. `calibration=FILE` stands for all quantities that `wsn calibrate` wrote
+        into the file. A replay without `periods` is as long as its recording.
         """
         changes: dict[str, Any] = dict(quantities)
         if "calibration" in changes:
@@ -254,16 +291,8 @@ class Scenario(Section):
         whole: dict[str, Any] = {}
         for name, registry in BY_NAME.items():
             if isinstance(changes.get(name), str):
-                kind, settings = kind_and_settings(registry, name, changes.pop(name))
-                own = {item.name for item in fields(kind)}
-                given = {key: changes.pop(key) for key in own & changes.keys()} | settings
-                try:
-                    whole[name] = kind(**given)
-                except TypeError:
-                    strange = next((key for key in given if key not in own), None)
-                    if strange is None:  # the kind's own mistake
-                        raise
-                    raise UnknownQuantity(kind.__name__, strange, own) from None
+                whole[name] = kind_named(registry, name, changes.pop(name), changes)
+        whole["faults"] = faults_named(changes.pop("faults", self.faults), changes)
         for item in fields(self):
             if item.name in changes:
                 whole[item.name] = changes.pop(item.name)
@@ -305,13 +334,13 @@ class Scenario(Section):
         plain: dict[str, Any] = {}
         for item in fields(self):
             value = getattr(self, item.name)
-            if is_dataclass(value):
-                plain[item.name] = {"kind": type(value).__name__} | {
-                    f.name: getattr(value, f.name) for f in fields(value)
-                }
-            else:
-                plain[item.name] = value
-        return plain
+            plain[item.name] = _plain(value) if is_dataclass(value) else value
+        return plain | {"faults": [_plain(fault) for fault in self.faults]}
+
+
+def _plain(section: Any) -> dict[str, Any]:
+    """A section's kind and quantities."""
+    return {"kind": type(section).__name__} | {item.name: getattr(section, item.name) for item in fields(section)}
 
 
 def _words(name: str, part: type) -> str:
@@ -323,7 +352,7 @@ def _words(name: str, part: type) -> str:
 def _kinds_with_quantities() -> dict[str, list[str]]:
     """By quantity, the kinds that have it: {"amplitude_m": ["motion='sine'"], ...}."""
     owners: dict[str, list[str]] = {}
-    for role, registry in BY_NAME.items():
+    for role, registry in {**BY_NAME, "faults": FAULTS}.items():
         for name, kind in registry.kinds.items():
             for item in fields(kind):
                 owners.setdefault(item.name, []).append(f"{role}={name!r}")

@@ -22,6 +22,7 @@ TRACKERS = {  # name: where the class stands
     "grnn_kf": "wsn_env.filters.grnn:GRNNKalmanTracker",
     **dict.fromkeys(BOUNDARY_TRACKERS, "wsn_env.filters.boundary:BoundaryTracker"),
 }
+ROBUST = ("gate_sds", "outlier_share", "node_sd_m")  # what reckons with wrong reports
 STRENGTHS = ("grnn", "grnn_kf")  # trackers that read values of one number
 RANGES = ("trilateration", "nonlinear_ls")  # that turn a value into a distance
 
@@ -57,6 +58,26 @@ class Tracking(Section):
         False,
         "weigh with who reported and who kept silent, too (particle only)",
         choices=(True, False),
+    )
+    gate_sds: float | None = quantity(
+        None,
+        "refuse a report that is off the prediction by more than so many sds in any number; None: use all (particle"
+        " only)",
+        above=0,
+        at_most=1e9,
+        optional=True,
+    )
+    outlier_share: float = quantity(
+        0.0,
+        "probability that a report is of something else, as the likelihood reckons with (particle only)",
+        at_least=0,
+        below=1,
+    )
+    node_sd_m: float = quantity(
+        0.0,
+        "sd of a node's position in x and in y, as the likelihood reckons with (particle only)",
+        at_least=0,
+        at_most=1e6,
     )
     resample_below: float = quantity(
         2 / 3, "resample at N_eff below this share of P (eq. 14); 1: always", at_least=0, at_most=1
@@ -116,3 +137,8 @@ class Tracking(Section):
     training_seed: int = quantity(
         0, "seed of a fingerprint network's training, apart from every episode's", at_least=0, whole=True
     )
+
+    @property
+    def robust(self) -> bool:
+        """Whether the likelihood reckons with wrong reports."""
+        return self.gate_sds is not None or self.outlier_share > 0 or self.node_sd_m > 0

@@ -6,7 +6,8 @@ import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.kernels import kernel, over_rows
-from wsn_env.models.kinds import constants_type, fill_constants
+from wsn_env.models.fault.base import change_track
+from wsn_env.models.kinds import made_constants
 from wsn_env.models.motion.base import Course, draw, reflect
 from wsn_env.scenario.scenario import Scenario
 
@@ -22,8 +23,9 @@ class Tracks:
     def __init__(self, scenario: Scenario) -> None:
         motion = scenario.motion
         motion.check(scenario)
-        self._motion = np.zeros(1, constants_type(motion, scenario))
-        fill_constants(self._motion, motion, scenario)
+        self._motion = made_constants(motion, scenario)
+        faults = enumerate(scenario.faults)
+        self._changes = [(made_constants(fault, scenario), number) for number, fault in faults if fault.changes_tracks]
         side_m, depth_m = scenario.field.room_m
         bounded = motion.bounded and not scenario.ends_outside
         self._course = scenario.period_s, side_m, depth_m, motion.recorded_tracks(scenario), bounded
@@ -31,6 +33,8 @@ class Tracks:
     def draw(self, rows: np.ndarray, keys: np.ndarray, tracks: np.ndarray, threads: int) -> None:
         """Fill tracks (B, periods + 1, 4) in the rows marked."""
         over_rows(_draw_tracks, len(rows), threads, self._motion, self._course, rows, keys, tracks)
+        for made, number in self._changes:
+            over_rows(_change_tracks, len(rows), threads, made, number, rows, keys, tracks)
 
 
 @kernel
@@ -50,6 +54,13 @@ def _draw_tracks(start, stop, cs, course, rows, keys, tracks):
                 for state in track:
                     reflect(state, 0, side_m)
                     reflect(state, 2, depth_m)
+
+
+@kernel
+def _change_tracks(start, stop, cs, number, rows, keys, tracks):
+    for b in range(start, stop):
+        if rows[b]:
+            change_track(cs[0], draws.stream(keys[b], number, draws.FAULT), tracks[b])
 
 
 def neighbourhood_m(scenario: Scenario) -> float:

@@ -42,6 +42,8 @@ def why_no_bound(scenario: Scenario) -> str | None:
         return "Tracking.search = True: the choice of a head tells of strengths; allowed is False"
     if scenario.ends_outside:
         return "Scenario.ends_outside = True: the mean is over the whole horizon; allowed is False"
+    if scenario.faults:
+        return f"Scenario.faults = {scenario.faults}: reports are not of the target alone; allowed is ()"
     if scenario.unscored:
         return f"Scenario.unscored = {scenario.unscored}: the mean is over the whole horizon; allowed is 0"
     return None

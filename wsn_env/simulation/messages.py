@@ -14,6 +14,7 @@ from wsn_env.compiled import draws
 from wsn_env.compiled.kernels import lean_piece
 from wsn_env.models.field import squared_distance
 from wsn_env.models.radio.base import reception, relayed, transmission
+from wsn_env.simulation.faults import try_success
 
 # NumPy's numbers: for each of Python's own Numba would compile a function of its own.
 SENSING, HANDOVER, INVITATION, REPORT, BROADCAST, SEARCH = np.arange(6)
@@ -130,13 +131,14 @@ def report(node: Any, head: Any, packets: float, purpose: Any, episode: Episode,
         return False
     packet = draws.SEARCH_PACKET if purpose == SEARCH else draws.PACKET
     stream = draws.stream(state.key[b], state.row[b].period, packet)
+    success = try_success(state, b, node, r.packet_success)
     for attempt in range(r.tries):
         sent = residual_j[node] > 0.0 and _charge(node, transmission(r, bits, squared), purpose, episode)
         if r.to_head:
             sent = sent and residual_j[head] > 0.0 and _charge(head, reception(r, bits), purpose, episode)
         if not sent:
             return False
-        if draws.uniform(stream, 16 * node + attempt) < r.packet_success:
+        if draws.uniform(stream, 16 * node + attempt) < success:
             note_residual(node, episode)  # what arrives also says what its sender has left, and how often it was tried
             if r.to_head:
                 for _ in range(attempt + 1):  # one by one, as they were charged: with the same rounding

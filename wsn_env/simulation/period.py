@@ -11,7 +11,6 @@ from wsn_env.filters.kernels import filter_row, make_scratch, redraw_row
 from wsn_env.models.measurement.base import (
     AtHead,
     Memory,
-    Occasion,
     finds_target,
     log_miss,
     news,
@@ -22,6 +21,7 @@ from wsn_env.models.measurement.base import (
 from wsn_env.models.motion.prediction import predict_moments, predict_walk
 from wsn_env.models.state import KEEP_CLUSTER, KEEP_HEAD, NOBODY, belief_at, state_at
 from wsn_env.simulation import messages
+from wsn_env.simulation.faults import fail_nodes, hold_back, what_is_sensed
 from wsn_env.simulation.geometry import nearest_living
 from wsn_env.simulation.lifetime import count_life
 from wsn_env.simulation.messages import Episode
@@ -109,6 +109,7 @@ def _sense_and_report(head, chosen, episode, c):
     messages.clear_ledger(state.ledger, b)
     _take_choice(head, chosen, episode, c.radio)  # handover, invitations [J]
     state.row[b].period += 1
+    fail_nodes(state, b)
     target = target_of(state, b)  # moves
     reports.count[b] = 0
     head, n, members = network.row[b].head, network.row[b].n_members, network.members[b]
@@ -121,6 +122,8 @@ def _sense_and_report(head, chosen, episode, c):
             node = head if k == place else members[k - (k > place)]
             if wake(node, messages.SENSING, episode, c.radio):
                 sense(node, head, messages.REPORT, target, episode, c)
+    if head >= 0 or not c.radio.to_head:
+        _send_late(head, episode, c)
     if head >= 0 and state.residual_j[b, head] <= 0.0:
         messages.note_residual(head, episode)
     if c.radio.asleep_j > 0.0:
@@ -220,20 +223,48 @@ def sense(node: Any, head: Any, purpose: Any, target: Any, episode: Episode, c: 
     state, b, out = episode
     if state.residual_j[b, node] <= 0.0:
         return
-    memory, reports = memory_of(state, b), state.reports
     sensor = node_at(state.network.positions[b], node)
-    occasion = Occasion(state.key[b], state.row[b].period, purpose == messages.SEARCH)
-    has_news, value, second, packets = news(c.measurement, memory, occasion, sensor, target[0], target[1], c)
+    occasion, x, y = what_is_sensed(state, b, sensor, purpose == messages.SEARCH, target, c)
+    has_news, value, second, packets = news(c.measurement, memory_of(state, b), occasion, sensor, x, y, c)
     if not has_news:
         return
     out.detections += 1
-    if messages.report(node, head, packets, purpose, episode, c.radio):
-        slot = reports.count[b]
-        reports.node[b, slot] = node
-        reports.value[b, slot, 0] = value
-        reports.value[b, slot, 1] = second
-        reports.count[b] += 1
-        take_note(c.measurement, memory, node, value)
+    is_heads = c.radio.to_head and node == head
+    sends, report = hold_back(state, b, node, (value, second, packets), is_heads)
+    if sends and messages.report(node, head, report[2], purpose, episode, c.radio):
+        _take_report(state.reports.count[b], node, report, episode, c)
+
+
+@lean_piece
+def _take_report(slot, node, report, episode, c):
+    """The head has a report, which stands at a place in the list."""
+    state, b = episode.state, episode.b
+    reports, (value, second, _) = state.reports, report
+    reports.node[b, slot] = node
+    reports.value[b, slot, 0] = value
+    reports.value[b, slot, 1] = second
+    reports.count[b] += 1
+    take_note(c.measurement, memory_of(state, b), node, value)
+
+
+@lean_piece
+def _send_late(head, episode, c):
+    """What has waited since the last period is sent, by nodes that have made nothing newer; each to its place."""
+    state, b = episode.state, episode.b
+    condition, reports, slot = state.condition[b], state.reports, 0
+    for number in range(len(condition)):
+        own, node = condition[number], np.int64(number)
+        while slot < reports.count[b] and reports.node[b, slot] < node:
+            slot += 1
+        waits = own.waiting > 0 and own.waiting == state.row[b].period - 1 and state.residual_j[b, node] > 0.0
+        if waits:
+            own.waiting = 0
+        if waits and messages.report(node, head, own.packets, messages.REPORT, episode, c.radio):
+            for k in range(reports.count[b], slot, -1):
+                reports.node[b, k] = reports.node[b, k - 1]
+                reports.value[b, k, 0] = reports.value[b, k - 1, 0]
+                reports.value[b, k, 1] = reports.value[b, k - 1, 1]
+            _take_report(slot, node, (own.value[0], own.value[1], own.packets), episode, c)
 
 
 @lean_piece

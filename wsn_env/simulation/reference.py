@@ -48,6 +48,8 @@ def why_no_reference(scenario: Scenario) -> str | None:
         why = "the errors of its levels last over periods"
     elif scenario.ends_outside:
         return "Scenario.ends_outside = True: episodes end before the horizon that the mean is over; allowed is False"
+    elif scenario.faults:
+        return f"Scenario.faults = {scenario.faults}: reports are not of the target alone; allowed is ()"
     else:
         return None
     return f"Scenario.measurement = {type(measurement).__name__}: {why}; allowed are reports with errors of their own"

@@ -5,12 +5,13 @@ from typing import Any
 import numpy as np
 
 from wsn_env.compiled.kernels import lean_kernel, lean_piece
-from wsn_env.models.measurement.base import Occasion, node_at, signal, tells
+from wsn_env.models.measurement.base import node_at, signal, tells
 from wsn_env.models.radio.base import reception
 from wsn_env.models.state import state_at
 from wsn_env.simulation import messages
+from wsn_env.simulation.faults import what_is_sensed
 from wsn_env.simulation.messages import Episode
-from wsn_env.simulation.period import sense, target_of, wake
+from wsn_env.simulation.period import sense, target_of
 
 
 @lean_kernel
@@ -63,7 +64,7 @@ def _wake_all(episode, c):
     state, b, out = episode
     network, standing = state.network, state.network.row[b]
     positions, residual_j, members = network.positions[b], state.residual_j[b], network.members[b]
-    occasion, target = Occasion(state.key[b], state.row[b].period, True), target_of(state, b)
+    target = target_of(state, b)
     call = reception(c.radio, c.radio.wakeup_bits)
     strongest, best, j = -1, -np.inf, 0
     out.members = 0
@@ -71,15 +72,19 @@ def _wake_all(episode, c):
         while j < standing.n_members and members[j] < node:
             j += 1
         awake = node == standing.head or (j < standing.n_members and members[j] == node)
-        living = residual_j[node] > 0.0
-        if network.battery[b, node] <= 0.0 or not messages.spend(node, call, messages.SEARCH, episode) or not living:
+        if network.battery[b, node] <= 0.0:
             continue
-        if not awake and not wake(node, messages.SEARCH, episode, c.radio):
+        # Of those that are dead, unknown to the network, it reckons with the same: it cannot tell them from others.
+        living, heard = residual_j[node] > 0.0, messages.spend(node, call, messages.SEARCH, episode)
+        left = residual_j[node] > 0.0
+        woken = awake or messages.spend(node, c.radio.awake_j, messages.SEARCH, episode)
+        if not (living and heard and woken) or not (awake or left):
             continue
         out.members += 1
         sensor = node_at(positions, node)
-        if residual_j[node] > 0.0 and tells(c.measurement, occasion, sensor, target[0], target[1], c):
-            strength = signal(c.measurement, occasion, sensor, target[0], target[1])
+        occasion, x, y = what_is_sensed(state, b, sensor, True, target, c)
+        if residual_j[node] > 0.0 and tells(c.measurement, occasion, sensor, x, y, c):
+            strength = signal(c.measurement, occasion, sensor, x, y)
             if strength > best:
                 strongest, best = node, strength
     return strongest
@@ -89,11 +94,13 @@ def _wake_all(episode, c):
 def _strongest_heard(episode, c):
     """Of those that a sink has heard the one with the strongest signal, the first by number where signals are alike."""
     state, b = episode.state, episode.b
-    occasion, target = Occasion(state.key[b], state.row[b].period, True), target_of(state, b)
+    target = target_of(state, b)
     strongest, best = np.int64(-1), -np.inf
     for k in range(state.reports.count[b]):
         node: Any = np.int64(state.reports.node[b, k])
-        strength = signal(c.measurement, occasion, node_at(state.network.positions[b], node), target[0], target[1])
+        sensor = node_at(state.network.positions[b], node)
+        occasion, x, y = what_is_sensed(state, b, sensor, True, target, c)
+        strength = signal(c.measurement, occasion, sensor, x, y)
         if strength > best:
             strongest, best = node, strength
     return strongest

@@ -18,6 +18,7 @@ from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import constants
 from wsn_env.scenario.tracks import Tracks
 from wsn_env.simulation import episode, period, search
+from wsn_env.simulation.faults import Faults
 
 LONG_LIST = 64
 
@@ -42,6 +43,7 @@ class World:
         self._run = kernels.Pinned(kernels.fast(period.run) if fast else period.run)
         self._constants = constants(scenario)
         self._tracks, self._packets = Tracks(scenario), scenario.measurement.packets_of(scenario)
+        self._faults = Faults(scenario)
         self._start, self._placed = episode.start_record(scenario), episode.placed_nodes(scenario)
 
     def reset(self, keys: npt.ArrayLike) -> State:
@@ -59,6 +61,8 @@ class World:
         s = self.scenario
         nodes = s.field.nodes
         lengths = dict(rows=rows, nodes=nodes, instants=s.periods + 1, particles=self.tracker.particles)
+        if self._faults.any:
+            lengths["faulty"] = nodes
         side = Grid.side(nodes)
         state = State.zeros(**lengths, cells=side * side + 1, **s.measurement.axes(nodes))
         state.network.grid.row["side"] = side
@@ -86,6 +90,7 @@ class World:
         threads = threads_for(rows, self.threads)
         self._tracks.draw(rows, keys, state.track, threads)
         over_rows(episode.begin, state.rows, threads, self._start, rows, keys, self._placed, state.handle)
+        self._faults.strike(rows, state, threads)
         if self._packets is not None:
             self._packets.fill(rows, state, threads)
         self.tracker.start(state.key, state.period.copy(), rows, state.belief)

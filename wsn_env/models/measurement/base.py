@@ -66,8 +66,9 @@ class Occasion(NamedTuple):
     """When a node senses."""
 
     key: Any  # of the episode's random numbers
-    period: int
+    period: int  # of the random numbers; a sensor that is stuck draws them of the period in which it got stuck
     asked: bool  # whether the head is looking for a lost target
+    clock: int  # the period by the clock
 
 
 class AtHead(NamedTuple):

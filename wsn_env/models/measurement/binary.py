@@ -119,7 +119,7 @@ class Binary(Measurement):
             memory.bitmap[node.number] = 0
             has_news = state
         else:
-            has_news = changed or (m.refresh > 0 and occasion.period % m.refresh == 0)
+            has_news = changed or (m.refresh > 0 and occasion.clock % m.refresh == 0)
         return has_news, np.float64(state), np.float64(changed), 1.0
 
     @staticmethod
