@@ -39,7 +39,7 @@ def read(path):
 
 
 def results_of(*settings, runs=RUNS):
-    return Results(runs, {setting: play(setting.trial(runs)) for setting in settings})
+    return Results(runs, {setting: play(setting.trial(runs)) for setting in settings}, {})
 
 
 @pytest.fixture(scope="module")
@@ -135,7 +135,7 @@ class Counts(Results):
     """Every run has as many reports as the closed forms say, but for noise and what a test changes."""
 
     def __init__(self, runs=20, centroid=lambda setting, count: count):
-        super().__init__(runs, {})
+        super().__init__(runs, {}, {})
         object.__setattr__(self, "centroid", centroid)
 
     def reporting(self, setting):
@@ -210,7 +210,7 @@ def test_every_row_is_there(short):
     assert len(read(short / "expected.csv")) == 73
     assert len(read(short / "error.csv")) == 50
     claims = read(short / "claims.csv")
-    assert len(claims) == 12 and {row["verdict"] for row in claims} <= {HOLDS, UNDER_READING, NOT_REPRODUCED}
+    assert len(claims) == 13 and {row["verdict"] for row in claims} <= {HOLDS, UNDER_READING, NOT_REPRODUCED}
 
 
 @pytest.mark.slow

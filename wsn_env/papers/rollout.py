@@ -135,6 +135,11 @@ def periods_until_dead(record: Record, nodes: int, share: float) -> np.ndarray:
     return np.where(dead.any(axis=1), dead.argmax(axis=1) + 1, dead.shape[1])
 
 
+def mean_and_error(counts: np.ndarray) -> str:
+    """Mean of whole numbers over the runs, and its standard error."""
+    return f"{counts.mean():.0f} ({standard_error(counts):.0f})"
+
+
 def pooled_rms(square: np.ndarray) -> Measured:
     """Root of the mean of squares (R, K), with its standard error over the runs."""
     return Measured.root_mean(square.mean(axis=1))

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from wsn_env.evaluation.intervals import Measured
-from wsn_env.papers.binary.energy import judge_energy
+from wsn_env.papers.binary.energy import judge_energy, judge_lifetime
 from wsn_env.papers.binary.results import Results
 from wsn_env.papers.binary.study import Study
 from wsn_env.papers.binary.systems import NODES, PERIODS_S, RADII_M, Setting, vary
@@ -28,6 +28,7 @@ def judge_claims(study: Study) -> list[Claim]:
         _lower_error(results),
         *_sweep_claims(results),
         *judge_energy(results),
+        judge_lifetime(results),
         *_crossing(results),
         _printed(study),
     ]

@@ -12,7 +12,7 @@ from wsn_env.papers.binary.readings import even_period_s, transmitting_nodes
 from wsn_env.papers.binary.results import Results
 from wsn_env.papers.binary.systems import LIFETIMES, NODES, PERIODS_S, RADII_M, Setting, vary
 from wsn_env.papers.claim import Claim, judge_claim
-from wsn_env.papers.rollout import SIGNIFICANT, exceeds, keeps_falling
+from wsn_env.papers.rollout import SIGNIFICANT, exceeds, keeps_falling, mean_and_error
 
 STEADY_SHARE = 0.05  # a count that changes by less does not change
 
@@ -23,7 +23,6 @@ def judge_energy(results: Results) -> Iterator[Claim]:
     yield _slow_against_steep(results, "number of nodes N", NODES, "nodes", (100, "100 nodes"))
     yield _slow_against_steep(results, "sensing radius R", RADII_M, "radius_m", (10.0, "10 m"))
     yield from _over_periods(results)
-    yield _lifetime(results)
 
 
 def _counts(results: Results, system: str, keyword: str, values: Sequence[float]) -> list[np.ndarray]:
@@ -97,12 +96,13 @@ def _over_periods(results: Results) -> Iterator[Claim]:
     )
 
 
-def _lifetime(results: Results) -> Claim:
+def judge_lifetime(results: Results) -> Claim:
+    """How long the network lasts, which the paper does not measure."""
     longer, parts = [], []
     for share, what in ((1e-9, "the first node"), (0.1, "a tenth"), (0.5, "half of them")):
         boundary, centroid = (results.dead_at(system, share) for system in LIFETIMES)
         longer.append(exceeds(boundary, centroid))
-        parts.append(f"{what} after {Measured.mean(boundary)} against {Measured.mean(centroid)} periods")
+        parts.append(f"{what} after {mean_and_error(boundary)} against {mean_and_error(centroid)} periods")
     ours = f"with batteries of 5 mJ and a target that never leaves, dead: {', '.join(parts)}"
     what = "the network lasts longer with the boundary method than with the centroid"
     return Claim(what, "no figure", ours, judge_claim(all(longer), longer[-1]))

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from wsn_env.evaluation.intervals import Measured, standard_error
+from wsn_env.evaluation.intervals import standard_error
 from wsn_env.papers.claim import Claim, judge_claim
-from wsn_env.papers.rollout import Record, exceeds
+from wsn_env.papers.rollout import Record, exceeds, mean_and_error
 from wsn_env.papers.underwater.expected import HARMLESS, KEEPS, LOSES, rmse_ratio
 from wsn_env.papers.underwater.systems import (
     HANDOVERS,
@@ -216,7 +216,7 @@ def _lifetime(results: Results) -> Claim:
     for share, what in ((1e-9, "the first node"), (0.1, "a tenth"), (0.5, "half of them")):
         base, calm = (results.dead_at(db, share) for db in LIFETIMES_DB)
         longer.append(exceeds(calm, base))
-        parts.append(f"{what} after {Measured.mean(calm)} against {Measured.mean(base)} periods")
+        parts.append(f"{what} after {mean_and_error(calm)} against {mean_and_error(base)} periods")
     ours = f"with batteries of 30 J and a target that never leaves, dead: {', '.join(parts)}"
     what = "With 3 dB of hysteresis the network lasts longer than without"
     return Claim(what, "-", ours, judge_claim(all(longer), longer[-1]))
