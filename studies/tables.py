@@ -54,6 +54,20 @@ HONESTY = (  # scenario, policy, what is changed, what that shows
     ("Ble-v0", "informed3", "temper=1", "with an exponent of 1 most of it is gone"),
 )
 
+MOTIONS = {  # what a filter may have to follow, in PreDC-v0
+    "crossing": "",
+    "straight": "motion=straight",
+    "sine": "motion=sine",
+    "circle": "motion=circle",
+    "turns of up to 90°": "motion=turns",
+    "waypoints": "motion=waypoint",
+    "walk": "motion=walk",
+    "crossing, with a stop": "faults=stops",
+}
+FIXED_Q = (0.0125, 0.025, 0.05, 0.1, 0.2, 0.4)  # m/s^2
+MANOEUVRE_Q = 0.6
+LOST_M = 20.0  # an episode's RMS counts as this at most
+
 
 @dataclass
 class Tables:
@@ -119,6 +133,24 @@ def silence(episodes: int | None) -> tuple[list[str], Rows]:
     return ["nearest3", "RMS m, the values alone", "RMS m, also who reported"], rows
 
 
+def motions(episodes: int | None) -> tuple[list[str], Rows]:
+    """A filter of fixed process noise against one whose target switches between modes, however the target moves."""
+    rows = []
+    for motion, changes in MOTIONS.items():
+        cells, square = [], {}
+        for q in (*FIXED_Q, None):
+            settings = f"filter_q={q}" if q is not None else f"manoeuvre_q={MANOEUVRE_Q}"
+            found = play(scenario_of("PreDC-v0", f"{changes} {settings}"), "nearest4", episodes or 200)
+            square[q] = np.minimum(found["rms_m"], LOST_M) ** 2
+            cells.append(str(Measured.root_mean(square[q])))
+        best = min(FIXED_Q, key=lambda q: square[q].mean())
+        cells[FIXED_Q.index(best)] = f"**{cells[FIXED_Q.index(best)]}**"
+        over = np.sqrt(square[None].mean() / square[best].mean())
+        rows.append([motion, *cells, f"{over:.2f}", str(Measured.mean(found["anees"]))])
+    columns = [*(f"q = {q:g}" for q in FIXED_Q), "modes", "over the best q", "ANEES"]
+    return ["RMS m", *columns], rows
+
+
 def anchors(episodes: int | None) -> tuple[list[str], Rows]:
     """What few anchors tell."""
     rows = []
@@ -177,6 +209,7 @@ TABLES: dict[str, Callable[[int | None], tuple[list[str], Rows]]] = {
     "reference_points": reference_points,
     "honesty": honesty,
     "silence": silence,
+    "motions": motions,
     "anchors": anchors,
     "references": references,
     "comparison_PreDC-v0": partial(comparison, "PreDC-v0"),

@@ -44,7 +44,7 @@ ROWS = 3
 HANG_S = 150  # longer than kernels take to compile
 SMALL = dict(nodes=60, periods=12, particles=300, candidates=20)  # at most so many: a case is short
 LENGTHS = ("_m", "_ms", "_ms2")  # endings of what grows with the world
-PARTICLE_ONLY = ("silent_information", "resampling", "redraw_on_handover", "velocity_s", *ROBUST)
+PARTICLE_ONLY = ("silent_information", "resampling", "redraw_on_handover", "velocity_s", "manoeuvre_q", *ROBUST)
 
 
 @dataclass(frozen=True)
@@ -231,6 +231,8 @@ def draw_tracking(rng: Random, sections: dict[str, Any], keywords: dict[str, Any
         drawn |= {name: usual[name] for name in ROBUST}
     if measurement.lasting_errors:
         drawn |= dict(search=False, fusion="joint")
+    if (keywords | drawn).get("velocity_s", sections["tracking"].velocity_s) is not None:
+        drawn["manoeuvre_q"] = None
     if (keywords | drawn).get("gate_sds") is not None:
         drawn |= dict(fusion="joint", silent_information=False)
     if tracker.startswith("boundary"):

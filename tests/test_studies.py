@@ -91,7 +91,7 @@ def test_learning_curves_join_resumed_runs_and_leave_cut_episodes_out(tmp_path):
 
 def test_the_pages_small_tables_are_what_is_measured(tmp_path):
     """A tenth of the episodes; those of shipped policies have a test of their own (test_pretrained.py)."""
-    names = ["reference_points", "honesty", "silence", "anchors"]
+    names = ["reference_points", "honesty", "silence", "motions", "anchors"]
     tables.main(["--episodes", "40", "--only", *names, "--out", str(tmp_path)])
     check_tables("environment.md", "tables", tmp_path, share=0.1)
     check_tables("results.md", "tables", tmp_path, share=0.1)

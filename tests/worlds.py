@@ -138,11 +138,16 @@ def cloud(draw, measurement):
         outlier_share=draw(st.sampled_from([0.0, 0.0, 0.1])),
         node_sd_m=draw(st.sampled_from([0.0, 0.0, 2.0])),
     )
-    return (robust if MEASUREMENTS.kinds[measurement]().independent else {}) | dict(
-        silent_information=measurement != "binary" and draw(st.sampled_from([False, False, True])),
-        resampling=draw(st.sampled_from(["systematic", "spread", "common_spread"])),
-        spread_scale=draw(st.sampled_from([0.5, 0.0, 3.0])),
-        redraw_on_handover=draw(st.sampled_from([False, False, True])),
+    modes = dict(manoeuvre_q=draw(st.sampled_from([None, None, 0.7]))) if measurement != "beacon" else {}
+    return (
+        (robust if MEASUREMENTS.kinds[measurement]().independent else {})
+        | modes
+        | dict(
+            silent_information=measurement != "binary" and draw(st.sampled_from([False, False, True])),
+            resampling=draw(st.sampled_from(["systematic", "spread", "common_spread"])),
+            spread_scale=draw(st.sampled_from([0.5, 0.0, 3.0])),
+            redraw_on_handover=draw(st.sampled_from([False, False, True])),
+        )
     )
 
 

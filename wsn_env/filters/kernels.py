@@ -14,6 +14,7 @@ from wsn_env.compiled.draws import normal_pair32
 from wsn_env.compiled.elementary import F, exp32, f32_bits, f32_from_bits
 from wsn_env.compiled.kernels import kernel, lean_kernel, lean_piece, piece
 from wsn_env.filters.likelihood import weigh_awake
+from wsn_env.filters.modes import allot_modes, inherit_modes, note_modes, predict_by_mode
 from wsn_env.filters.resampling import REACH, correlated, lower_root, resample, spread_copies, spread_copies_alike
 from wsn_env.filters.robust import weigh_robustly
 from wsn_env.filters.walkers import scatter_walkers, walk
@@ -153,6 +154,7 @@ def spread_rows(
         if rows[b]:
             stream = draws.stream(keys[b], periods[b], draws.CLOUD)
             spread(stream, belief.row[b].mean, belief.row[b].cov, belief.particles[b], belief.log_weights[b])
+            allot_modes(belief.modes[b], belief.row[b].mode_probabilities)
 
 
 @lean_kernel
@@ -221,6 +223,8 @@ def filter_row(key: Any, period: int, head: AtHead, c: Any, maps: np.ndarray, sc
     n, count = x.shape[1], reports.count[b]
     if c.tracking.walks:
         walk(draws.stream(key, period, draws.PROCESS), x, c.tracking)
+    elif c.tracking.switches:
+        predict_by_mode(draws.stream(key, period, draws.PROCESS), x, belief.modes[b], c.tracking)
     else:
         predict(draws.stream(key, period, draws.PROCESS), x, c.period_s, c.tracking.q)
     if c.tracking.robust:
@@ -231,11 +235,13 @@ def filter_row(key: Any, period: int, head: AtHead, c: Any, maps: np.ndarray, sc
         weigh_awake(x, log_weights, network, reports.node[b, :count], b, c)
     normalise(log_weights, weights)
     row.n_eff, total = moments(x, weights, row.predicted_mean, row.mean, row.cov)
+    note_modes(belief.modes[b], weights, row.mode_probabilities)
     resampled = row.n_eff < c.tracking.resample_below * n
     if resampled:
         u = draws.uniform(draws.stream(key, period, draws.RESAMPLING), 0)
         resample(u, x, log_weights, weights, total, slots, states)
         draw_biases(belief.biases[b], slots[2, REACH:], weights)
+        inherit_modes(belief.modes[b], slots[2, REACH:], slots[0])
         if c.tracking.spread_alike:
             spread_copies_alike(slots[2, REACH:], c.tracking.spread_scale, row.cov, x)
         elif c.tracking.spread_scale > 0.0:

@@ -63,12 +63,22 @@ def weigh_robustly(head: AtHead, c: Any, scratch: np.ndarray) -> None:
         seen = judge(node, value, target, c)
         if seen.sds > t.gate_sds:
             continue
-        scratch[:] = F(0)
-        first, stride = (j, count) if t.pooled else (0, 1)  # every count-th particle from the j-th on, or all
-        weigh(c.measurement, x[0, first::stride], x[2, first::stride], scratch[first::stride], node, value)
         temper, good, other = F(seen.temper), F(1.0 - t.outlier_share), F(t.outlier_share * seen.outlier)
-        for i in range(first, len(scratch), stride):
-            if other > F(0):
-                log_weights[i] += log32(min(good * exp32(temper * scratch[i]) + other, F(1)))
-            else:
-                log_weights[i] += temper * scratch[i]
+        scratch[:] = F(0)
+        if t.pooled:  # every count-th particle from the j-th on
+            weigh(c.measurement, x[0, j::count], x[2, j::count], scratch[j::count], node, value)
+            _add(log_weights[j::count], scratch[j::count], temper, good, other)
+        else:
+            weigh(c.measurement, x[0], x[2], scratch, node, value)
+            _add(log_weights, scratch, temper, good, other)
+
+
+@lean_piece
+def _add(log_weights, likelihoods, temper, good, other):
+    """Add the log of good L^temper + other, given ln L."""
+    if other > F(0):
+        for i in range(len(log_weights)):
+            log_weights[i] += log32(min(good * exp32(temper * likelihoods[i]) + other, F(1)))
+    else:
+        for i in range(len(log_weights)):
+            log_weights[i] += temper * likelihoods[i]

@@ -18,6 +18,7 @@ from wsn_env.compiled.arrays import Arrays, array, opener, part, record
 from wsn_env.compiled.kernels import inline_piece
 from wsn_env.models.fault.base import CONDITION
 from wsn_env.models.measurement.beacon_levels import RECEIVER
+from wsn_env.models.motion.modes import COUNT
 from wsn_env.models.quantity import short
 
 BELIEF = record(
@@ -27,6 +28,7 @@ BELIEF = record(
         ("predicted_mean", "f8", 4),  # for the period to come
         ("predicted_cov", "f8", (4, 4)),
         ("n_eff", "f8"),  # effective sample size before resampling; 0 for trackers without particles
+        ("mode_probabilities", "f8", COUNT),  # of the modes in which the target goes on; zeros for filters without
     ]
 )
 
@@ -114,6 +116,7 @@ class Belief(Arrays):
     receivers: np.ndarray = array(RECEIVER, "rows", "receivers")  # (B, 0) if errors do not last
     particles: np.ndarray = array(np.float32, "rows", 4, "particles")  # P = 0 for trackers without
     log_weights: np.ndarray = array(np.float32, "rows", "particles")  # at most 0
+    modes: np.ndarray = array(np.int8, "rows", "switching")  # each particle's; (B, 0) for filters without
     biases: np.ndarray = array(np.float32, "rows", "receivers", "particles")  # dB: mean of each receiver's bias if a
     # particle is right
 

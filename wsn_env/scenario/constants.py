@@ -23,6 +23,8 @@ TRACKING = record(
         ("radius_m", "f8"),
         ("error_cap_m", "f8"),  # inf: none
         ("q", "f8"),
+        ("switches", "i8"),  # 1: the filter's target switches between modes of motion
+        ("manoeuvre_q", "f8"),
         ("walks", "i8"),
         ("velocity_kept", "f8"),  # of a walker's, from period to period
         ("velocity_sd", "f8"),
@@ -113,6 +115,8 @@ def _constants(scenario: Scenario) -> np.ndarray:
         radius_m=scenario.radius_m,
         error_cap_m=math.inf if scenario.error_cap_m is None else scenario.error_cap_m,
         q=scenario.filter_q,
+        switches=t.manoeuvre_q is not None,
+        manoeuvre_q=t.manoeuvre_q or 0.0,
         walks=walks,
         velocity_kept=1.0 if t.velocity_s is None else math.exp(-scenario.period_s / t.velocity_s),
         velocity_sd=t.rest_sd_ms,

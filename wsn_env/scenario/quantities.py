@@ -148,6 +148,7 @@ class Quantities(TypedDict, total=False):
     spread_scale: float
     redraw_on_handover: bool
     filter_q: float | None
+    manoeuvre_q: float | None
     velocity_s: float | None
     gate_m: float | None
     start: Literal["known", "search", "field", "fix"]

@@ -155,6 +155,7 @@ class Scenario(Section):
             "resampling": name != "particle",
             "redraw_on_handover": name != "particle",
             "velocity_s": name != "particle",
+            "manoeuvre_q": name != "particle" or self.tracking.velocity_s is not None,
             "gate_m": name not in BOUNDARY_TRACKERS,
         }
         usual = {item.name: item.default for item in fields(self.tracking)}

@@ -103,6 +103,14 @@ class Tracking(Section):
         at_most=1000,
         optional=True,
     )
+    manoeuvre_q: float | None = quantity(
+        None,
+        "the filter's target switches between modes of motion, from quiet to manoeuvring with acceleration noise of"
+        " this sd [m/s^2], so that the filter finds out how it moves; None: filter_q throughout (particle only)",
+        above=0,
+        at_most=1000,
+        optional=True,
+    )
     velocity_s: float | None = quantity(
         None,
         "the filter's target walks in the room: its velocity is an Ornstein-Uhlenbeck process of sd rest_sd_ms and this"

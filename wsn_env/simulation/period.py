@@ -18,6 +18,7 @@ from wsn_env.models.measurement.base import (
     predict_reports,
     take_note,
 )
+from wsn_env.models.motion.modes import predict_mixture
 from wsn_env.models.motion.prediction import predict_moments, predict_walk
 from wsn_env.models.state import KEEP_CLUSTER, KEEP_HEAD, NOBODY, belief_at, state_at
 from wsn_env.simulation import messages
@@ -344,6 +345,8 @@ def _settle(episode, r, t):
     state.row[b].random_bits = np.uint32(bits >> np.uint64(32))
     if t.walks:
         predict_walk(mean, cov, t, belief.predicted_mean, belief.predicted_cov)
+    elif t.switches:
+        predict_mixture(mean, cov, belief.mode_probabilities, t, belief.predicted_mean, belief.predicted_cov)
     else:
         predict_moments(mean, cov, t.period_s, t.q, belief.predicted_mean, belief.predicted_cov)
 

@@ -61,6 +61,8 @@ class World:
         s = self.scenario
         nodes = s.field.nodes
         lengths = dict(rows=rows, nodes=nodes, instants=s.periods + 1, particles=self.tracker.particles)
+        if s.tracking.manoeuvre_q is not None:
+            lengths["switching"] = self.tracker.particles
         if self._faults.any:
             lengths["faulty"] = nodes
         side = Grid.side(nodes)

@@ -1,0 +1,145 @@
+"""A filter whose target switches between modes of motion."""
+
+import numpy as np
+import pytest
+from numba import njit
+
+from tests.worlds import assert_same, keys_of
+from wsn_env import Scenario, View, World, make_policy
+from wsn_env.compiled import draws
+from wsn_env.filters.modes import allot_modes, inherit_modes, predict_by_mode
+from wsn_env.models import ScenarioError
+from wsn_env.models.motion.modes import COUNT, DRAWS, MODES, predict_mixture
+from wsn_env.scenario.constants import constants
+
+MANOEUVRE = 0.6
+CLOUD = 400_000
+LEAVES = np.array([mode.leaves for mode in MODES])
+SHARES = np.array([mode.draws for mode in MODES]) / DRAWS
+
+
+def scenario_of(motion="crossing", **changes):
+    return Scenario.named("PreDC-v0", motion=motion, **dict(manoeuvre_q=MANOEUVRE, particles=1000) | changes)
+
+
+@njit
+def moved(cs, x, modes, seed):
+    predict_by_mode(draws.stream(np.uint64(seed), 1, 7), x, modes, cs[0].tracking)
+
+
+@njit
+def mixture(cs, mean, cov, probabilities, predicted_mean, predicted_cov):
+    predict_mixture(mean, cov, probabilities, cs[0].tracking, predicted_mean, predicted_cov)
+
+
+def test_shares_of_the_modes_are_whole():
+    assert sum(mode.draws for mode in MODES) == DRAWS and all(0 < mode.leaves < 1 for mode in MODES)
+
+
+@pytest.mark.parametrize("mode", range(COUNT))
+def test_the_predicted_moments_are_those_of_the_particles(mode):
+    """All start in one mode, with velocities that vary a little: moments within four standard errors."""
+    cs, rng = constants(scenario_of()), np.random.default_rng(mode)
+    mean, cov = np.array([40.0, 1.2, 60.0, -0.7]), np.diag([4.0, 0.01, 4.0, 0.01])
+    x = rng.multivariate_normal(mean, cov, CLOUD).T.astype(np.float32)
+    modes = np.full(CLOUD, mode, np.int8)
+    moved(cs, x, modes, 3 + mode)
+    probabilities, predicted = np.zeros(COUNT), (np.empty(4), np.empty((4, 4)))
+    probabilities[mode] = 1.0
+    mixture(cs, mean, cov, probabilities, *predicted)
+    sds = np.sqrt(np.diag(predicted[1]))
+    assert (abs(x.mean(axis=1) - predicted[0]) < 4 * sds / CLOUD**0.5 + 1e-4).all()
+    off = np.cov(x.astype(float)) - predicted[1]
+    # Of a mixture's heavy tails: three times a normal's standard error; and the second order of a turn, left out.
+    assert (abs(off) < 12 * np.outer(sds, sds) * (2 / CLOUD) ** 0.5 + 2e-3 * np.outer(sds, sds)).all()
+
+
+@pytest.mark.parametrize("mode", range(COUNT))
+def test_a_mode_ends_as_often_as_said_and_others_follow_in_their_shares(mode):
+    modes, x = np.full(CLOUD, mode, np.int8), np.zeros((4, CLOUD), np.float32)
+    moved(constants(scenario_of()), x, modes, 8)
+    counts = np.bincount(modes, minlength=COUNT) / CLOUD
+    expected = LEAVES[mode] * SHARES + (1 - LEAVES[mode]) * (np.arange(COUNT) == mode)
+    assert abs(counts - expected).max() < 4 * (0.25 / CLOUD) ** 0.5 + 32 / 2**14  # probabilities are rounded so
+
+
+def test_particles_begin_with_the_modes_shares_and_keep_their_ancestors():
+    modes, probabilities = np.zeros(64 * DRAWS, np.int8), np.empty(COUNT)
+    allot_modes(modes, probabilities)
+    np.testing.assert_allclose(np.bincount(modes, minlength=COUNT) / len(modes), SHARES)
+    np.testing.assert_allclose(probabilities, SHARES)
+    ancestors = np.sort(np.random.default_rng(0).integers(len(modes), size=len(modes))).astype(np.int32)
+    before = modes.copy()
+    inherit_modes(modes, ancestors, np.empty(len(modes), np.int32))
+    np.testing.assert_array_equal(modes, before[ancestors])
+
+
+def play(scenario, rows=60, seed=4):
+    """Root mean square error (rows,) and mean NEES of nearest4's episodes; the final state."""
+    world, policy = World(scenario, threads=1), make_policy("nearest4", scenario)
+    state, squares, nees = world.reset(keys_of(seed, rows)), 0, 0
+    for _ in range(scenario.periods):
+        state, outcome = world.step(state, policy.act(View.of(state)), donate=True)
+        off = state.belief.mean[:, ::2] - outcome.target_m
+        inverse = np.linalg.inv(state.belief.cov[:, ::2, ::2] + 1e-9 * np.eye(2))
+        squares, nees = squares + outcome.error_m**2, nees + np.einsum("bi,bij,bj->b", off, inverse, off) / 2
+    return np.sqrt(squares / scenario.periods), nees / scenario.periods, state
+
+
+@pytest.mark.parametrize("motion", ["turns", "waypoint", "circle", "walk"])
+def test_it_follows_as_well_as_the_noise_that_fits_though_nobody_tells(motion):
+    """Paired with the best of fixed noises, q of each motion in hindsight: .1 for a walk, .2 for the others."""
+    fitting, _, _ = play(scenario_of(motion, manoeuvre_q=None, filter_q=0.1 if motion == "walk" else 0.2))
+    found, nees, _ = play(scenario_of(motion))
+    worse = found - 1.03 * fitting
+    assert worse.mean() < 2 * worse.std() / len(worse) ** 0.5
+    assert 0.6 < np.median(nees) < 1.6
+
+
+def mean_modes(scenario, rows=40):
+    """(COUNT,) probabilities over the last periods of nearest4's episodes."""
+    world, policy = World(scenario, threads=1), make_policy("nearest4", scenario)
+    state, total = world.reset(keys_of(4, rows)), np.zeros(COUNT)
+    for period in range(scenario.periods):
+        state, _ = world.step(state, policy.act(View.of(state)), donate=True)
+        total += state.belief.mode_probabilities.mean(axis=0) * (period >= 30)
+    return total / (scenario.periods - 30)
+
+
+def test_the_modes_are_those_of_the_motion():
+    """Who flies a circle to the left turns left; who goes straight is quiet."""
+    circling, straight = (mean_modes(scenario_of(motion, particles=3000)) for motion in ("circle", "straight"))
+    quiet, left, right = 0, 2, 3
+    assert circling[left] > 0.2 > 10 * circling[right] and circling[left] > 20 * straight[left]
+    assert straight[quiet] > 0.85 > 2 * circling[quiet]
+
+
+def test_without_modes_nothing_is_kept_of_them():
+    state = World(Scenario.named("PreDC-v0", particles=20)).reset([1])
+    assert state.belief.modes.shape == (1, 0) and not state.belief.mode_probabilities.any()
+
+
+def test_a_batch_has_the_bits_of_its_rows():
+    scenario = scenario_of("turns", particles=50, periods=12)
+    keys = keys_of(1, 9)
+    batch, alone = (World(scenario, threads=2).reset(keys), World(scenario, threads=1).reset(keys[4:5]))
+    policy = make_policy("nearest2", scenario)
+    for _ in range(scenario.periods):
+        batch, _ = World(scenario, threads=2).step(batch, policy.act(View.of(batch)))
+        alone, _ = World(scenario, threads=1).step(alone, policy.act(View.of(alone)))
+        assert_same(batch.belief, alone.belief, slice(4, 5))
+
+
+def test_the_planner_plans_with_one_mode():
+    scenario = scenario_of(particles=200, periods=3)
+    world, policy = World(scenario, threads=1), make_policy("planner", scenario)
+    state = world.reset([3])
+    for _ in range(3):
+        state, outcome = world.step(state, policy.act(View.of(state)))
+    assert outcome.error_m[0] < 5
+
+
+@pytest.mark.parametrize("more", [dict(tracker="ekf"), dict(velocity_s=5.0)])
+def test_it_is_refused_where_it_would_do_nothing(more):
+    with pytest.raises(ScenarioError, match="Tracking.manoeuvre_q = 0.6: allowed is None"):
+        scenario_of(**more)
