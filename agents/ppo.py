@@ -99,9 +99,12 @@ class PPOPolicy(ViewPolicy):
             if (settings.action, settings.observation) not in INTERFACES:
                 pair = settings.action, settings.observation
                 raise ValueError(f"(action, observation) = {pair}: must be one of {INTERFACES}")
-            interfaces = [Interface(self.scenario, settings)]
-            if self.scenario.scarce_energy:
-                interfaces.append(Interface(self.scenario.override(scarce_energy=False), settings))
+            # It may have been trained without what observations tell in this scenario.
+            interfaces = [
+                Interface(self.scenario.override(scarce_energy=scarce, manoeuvre_q=manoeuvre_q), settings)
+                for scarce in dict.fromkeys((self.scenario.scarce_energy, False))
+                for manoeuvre_q in dict.fromkeys((self.scenario.tracking.manoeuvre_q, None))
+            ]
         except (TypeError, ValueError) as problem:
             raise ValueError(f"{path} is not a saved policy: {problem}") from None
         weights = path.with_suffix(".safetensors")

@@ -7,6 +7,8 @@ from numba import njit
 from tests.worlds import assert_same, keys_of
 from wsn_env import Scenario, View, World, make_policy
 from wsn_env.compiled import draws
+from wsn_env.envs.features import BELIEF_FEATURES, MOTION_FEATURES
+from wsn_env.envs.observations import make_observation
 from wsn_env.filters.modes import allot_modes, inherit_modes, predict_by_mode
 from wsn_env.models import ScenarioError
 from wsn_env.models.motion.modes import COUNT, DRAWS, MODES, predict_mixture
@@ -112,6 +114,44 @@ def test_the_modes_are_those_of_the_motion():
     quiet, left, right = 0, 2, 3
     assert circling[left] > 0.2 > 10 * circling[right] and circling[left] > 20 * straight[left]
     assert straight[quiet] > 0.85 > 2 * circling[quiet]
+
+
+@pytest.mark.parametrize(("changes", "low", "high"), [({}, 0.9, 1.1), (dict(faults="biased,share=1,bias_m=9"), 2, 9)])
+def test_reports_surprise_as_much_as_expected_where_the_model_holds(changes, low, high):
+    """Filter and track have the same noise; sensors that are off by 9 m are another matter."""
+    free = dict(motion="free", acceleration_ms2=0.05, filter_q=0.05, search=False, spread_m=10.0, speed_ms=0.2)
+    world = World(Scenario.named("PreDC-v0", **free, **changes), threads=1)
+    state, policy, seen = world.reset(keys_of(9, 80)), make_policy("nearest4", world.scenario), []
+    for period in range(60):
+        state, _ = world.step(state, policy.act(View.of(state)), donate=True)
+        seen += [state.belief.surprise.mean()] if period > 20 else []
+    assert low < np.mean(seen) < high
+
+
+def test_observations_tell_of_the_motion():
+    scenario = scenario_of("turns")
+    world, policy = World(scenario, threads=1), make_policy("nearest2", scenario)
+    state = world.reset(keys_of(2, 5))
+    for _ in range(20):
+        state, _ = world.step(state, policy.act(View.of(state)))
+    view = View.of(state)
+    for name in ("candidates", "menu"):
+        usual = make_observation(name, scenario.override(manoeuvre_q=None), "nearest", 12).encode(view)
+        told = make_observation(name, scenario, "nearest", 12).encode(view)
+        first, more = len(BELIEF_FEATURES), len(MOTION_FEATURES)
+        np.testing.assert_array_equal(np.delete(told, np.s_[first : first + more], axis=1), usual)
+        features = told[:, first : first + more]
+        np.testing.assert_allclose(features[:, 0], 0.5 * np.log(state.belief.surprise), atol=1e-6)
+        np.testing.assert_allclose(features[:, 1:], state.belief.mode_probabilities, atol=1e-6)
+        again = View.from_arrays(view.as_arrays())
+        np.testing.assert_array_equal(make_observation(name, scenario, "nearest", 12).encode(again), told)
+
+
+def test_a_policy_that_knows_of_no_modes_plays_with_them():
+    scenario = scenario_of("crossing", particles=200, periods=5)
+    world, policy = World(scenario, threads=1), make_policy("ppo", scenario)
+    state, outcome = world.step(world.reset([1]), policy.act(View.of(world.reset([1]))))
+    assert outcome.error_m[0] < 10
 
 
 def test_without_modes_nothing_is_kept_of_them():

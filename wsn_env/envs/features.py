@@ -9,6 +9,7 @@ from wsn_env.compiled.kernels import lean_piece
 from wsn_env.envs.expectations import Outlook
 from wsn_env.envs.merit import gain, position_cov, squared_between
 from wsn_env.envs.scarcity import ENERGY_FEATURES, describe_energy
+from wsn_env.models.motion.modes import COUNT, MODES
 from wsn_env.scenario import Scenario
 
 BELIEF_FEATURES = (
@@ -32,6 +33,10 @@ BELIEF_FEATURES = (
     "joint_detection",  # of the standing cluster
     "sparseness",  # distance of the ninth nearest candidate
 )
+MOTION_FEATURES = (  # behind them, where the filter finds out how the target moves
+    "surprise",  # log, halved
+    *(mode.name for mode in MODES),  # probabilities of its modes
+)
 CANDIDATE_FEATURES = (
     "ahead",  # in radii along and across the velocity, from the prediction
     "left",
@@ -48,12 +53,15 @@ CANDIDATE_FEATURES = (
 WIDTH = len(CANDIDATE_FEATURES)
 G = len(BELIEF_FEATURES)
 BOUND = 10.0
+LEAST_SURPRISE = 0.01
 NINTH = 9
 
 
 def belief_features(scenario: Scenario) -> tuple[str, ...]:
-    """What observations tell of a row's belief, and of its energy where that is scarce."""
-    return BELIEF_FEATURES + (ENERGY_FEATURES if scenario.scarce_energy else ())
+    """What observations tell of a row's belief; of its motion where the filter finds out, of its energy where that is
+    scarce."""
+    of_motion = MOTION_FEATURES if scenario.tracking.manoeuvre_q is not None else ()
+    return BELIEF_FEATURES + of_motion + (ENERGY_FEATURES if scenario.scarce_energy else ())
 
 
 class Heading(NamedTuple):
@@ -104,11 +112,16 @@ def describe_row(known: Any, b: int, outlook: Outlook, c: Any, f: np.ndarray) ->
 
     Returns: the direction of the predicted velocity, and how many features they are.
     """
-    heading = describe_belief(outlook, known.row[b], known.reports.count[b], c.radius_m, f[:G])
+    heading, end = describe_belief(outlook, known.row[b], known.reports.count[b], c.radius_m, f[:G]), G
+    if c.switches:
+        f[end] = 0.5 * log(max(known.belief[b].surprise, LEAST_SURPRISE))
+        for k in range(COUNT):
+            f[end + 1 + k] = known.belief[b].mode_probabilities[k]
+        end += 1 + COUNT
     if c.scarce_energy:
-        describe_energy(known, b, c, f[G : G + len(ENERGY_FEATURES)])
-        return heading, G + len(ENERGY_FEATURES)
-    return heading, G
+        describe_energy(known, b, c, f[end : end + len(ENERGY_FEATURES)])
+        end += len(ENERGY_FEATURES)
+    return heading, end
 
 
 @lean_piece

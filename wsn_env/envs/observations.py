@@ -23,6 +23,7 @@ from wsn_env.envs.features import (
 from wsn_env.envs.merit import ORDERS, RANKED, order_row, rank_row
 from wsn_env.envs.prospects import Units, describe_entries, describe_standing, entry_features
 from wsn_env.models.measurement.base import Order
+from wsn_env.models.motion.modes import COUNT
 from wsn_env.models.quantity import suggest
 from wsn_env.models.state import knowledge_at
 from wsn_env.scenario import Scenario
@@ -225,6 +226,11 @@ class ViewObservation:
                 "detected": spaces.Box(0, 1, (nodes,), np.int8),
                 "measured": box(-far, far, nodes, 2),
             }
+            | (
+                {"surprise": box(0.0, far, 1), "mode_probabilities": box(0.0, 1.0, COUNT)}
+                if scenario.tracking.manoeuvre_q is not None
+                else {}
+            )
             | (self._of_receivers(box, nodes, far) if scenario.measurement.lasting_errors else {})
             | ({"bitmap": spaces.Box(0, 1, (nodes,), np.int8)} if scenario.measurement.reports_state else {})
         )

@@ -100,6 +100,7 @@ def begin(
         state.sensed[b] = 0
         state.reports.count[b] = 0
         state.reports.bitmap[b] = 0
+        belief.surprise = 1.0
         belief.n_eff = state.belief.particles.shape[2]
         _first_belief(draws.stream(key, 0, draws.START), state.track[b, 0], s, belief.mean, belief.cov)
         for axis in range(4):  # where a first search takes the target to be

@@ -27,6 +27,9 @@ from wsn_env.simulation.geometry import nearest_living
 from wsn_env.simulation.lifetime import count_life
 from wsn_env.simulation.messages import Episode
 
+LEAST_LEARNT, MOST_SURPRISE = 0.01, 100.0
+REMEMBERED = 0.2  # share of the last period in the mean
+
 
 @kernel
 def run(start: int, stop: int, cs: Any, handle: np.ndarray, maps: np.ndarray, cluster: Any, results: Any) -> int:
@@ -328,6 +331,8 @@ def _settle(episode, r, t):
     belief, target = state.belief.row[b], target_of(state, b)
     mean, cov = belief.mean, belief.cov
     _remove_dead_nodes(episode, r)
+    if state.reports.count[b] > 0:
+        _note_surprise(belief)
     total = 0.0
     for joules in out.energy_j:
         total += joules
@@ -349,6 +354,22 @@ def _settle(episode, r, t):
         predict_mixture(mean, cov, belief.mode_probabilities, t, belief.predicted_mean, belief.predicted_cov)
     else:
         predict_moments(mean, cov, t.period_s, t.q, belief.predicted_mean, belief.predicted_cov)
+
+
+@lean_piece
+def _note_surprise(belief):
+    """How far a period's reports have moved the estimate, over what was expected, with the positions' covariances P
+
+        |x - x_predicted|^2 / (tr P_predicted - tr P)
+
+    whose mean is about 1 where the filter's model holds; averaged over the last few periods with reports.
+    """
+    mean, cov, predicted, before = belief.mean, belief.cov, belief.predicted_mean, belief.predicted_cov
+    spread = before[0, 0] + before[2, 2]
+    learnt = spread - cov[0, 0] - cov[2, 2]
+    if learnt > LEAST_LEARNT * spread:
+        moved = (mean[0] - predicted[0]) ** 2 + (mean[2] - predicted[2]) ** 2
+        belief.surprise += REMEMBERED * (min(moved / learnt, MOST_SURPRISE) - belief.surprise)
 
 
 @lean_piece

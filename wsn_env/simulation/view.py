@@ -17,6 +17,7 @@ from wsn_env.models.quantity import short, whole_number
 from wsn_env.models.state import Cluster, Grid, Knowledge, Network, Reports, State
 from wsn_env.simulation import geometry
 
+MOVING = ("surprise", "mode_probabilities")  # what the filter tells of how the target moves
 HEARING = ("latest_db", "gradient", "variance")  # of a beacon's receivers, what policies ask for
 
 
@@ -224,6 +225,8 @@ class View:
             "detected": self.detected.astype(np.int8),
             "measured": self.measured.copy(),
         }
+        if self.belief["mode_probabilities"].any():
+            arrays |= {name: self.belief[name].reshape(len(self.row), -1).copy() for name in MOVING}
         if self.receivers.shape[1]:
             arrays |= {name: self.receivers[name].copy() for name in HEARING}
         return arrays | ({"bitmap": self.reports.bitmap.copy()} if self.reports.bitmap.shape[1] else {})
@@ -254,6 +257,8 @@ class View:
             known.row[name] = a[name].reshape(rows)
         for name in ("mean", "cov", "predicted_mean", "predicted_cov"):
             known.belief[name] = a[name]
+        for name in MOVING if MOVING[0] in a else ():
+            known.belief[name] = a[name].reshape(known.belief[name].shape)
         for name in HEARING if known.receivers.size else ():
             known.receivers[name] = a[name]
 

@@ -20,6 +20,7 @@ STEPS = 2**14  # to which probabilities of leaving a mode are rounded
 class Mode(NamedTuple):
     """A way to move."""
 
+    name: str
     acceleration: float  # sd, in units of the manoeuvring one's
     turn: float  # to the left in a period [rad]
     leaves: float  # probability that it ends in a period
@@ -27,11 +28,11 @@ class Mode(NamedTuple):
 
 
 MODES = (  # found by trial on straight, turning, stopping and recorded motion (docs/environment.md)
-    Mode(0.031, 0.0, 0.021, 13),  # quiet
-    Mode(0.34, 0.0, 0.045, 11),  # varying
-    Mode(0.17, 0.08, 0.08, 1),  # turning to the left and to the right
-    Mode(0.17, -0.08, 0.08, 1),
-    Mode(1.0, 0.0, 0.11, 6),  # manoeuvring
+    Mode("quiet", 0.031, 0.0, 0.021, 13),
+    Mode("varying", 0.34, 0.0, 0.045, 11),
+    Mode("turning_left", 0.17, 0.08, 0.08, 1),
+    Mode("turning_right", 0.17, -0.08, 0.08, 1),
+    Mode("manoeuvring", 1.0, 0.0, 0.11, 6),
 )
 COUNT = len(MODES)
 
