@@ -331,7 +331,7 @@ def _settle(episode, r, t):
     belief, target = state.belief.row[b], target_of(state, b)
     mean, cov = belief.mean, belief.cov
     _remove_dead_nodes(episode, r)
-    if state.reports.count[b] > 0:
+    if state.row[b].period > 0 and state.reports.count[b] > 0:  # in period 0 nothing was predicted
         _note_surprise(belief)
     total = 0.0
     for joules in out.energy_j:
