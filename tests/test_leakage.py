@@ -7,6 +7,7 @@ from tests.anchors import play_subsets, ring_scenario
 from wsn_env import World
 from wsn_env.filters import make_tracker
 from wsn_env.filters.fingerprint import _network, _training, trained_network, training_of
+from wsn_env.filters.surprise import note_surprise
 from wsn_env.models.motion.prediction import predict_moments
 from wsn_env.scenario.tracking import BOUNDARY_TRACKERS, TRACKERS
 
@@ -33,6 +34,8 @@ def test_a_replay_of_the_reports_gives_the_same_beliefs(name, start):
         tracker.correct(before.key, after.period.copy(), belief, after.network, after.reports, np.zeros(2, bool))
         for row in range(2):
             b = belief.row[row]
+            if after.reports.count[row] > 0:
+                note_surprise(b)
             predict_moments(b["mean"], b["cov"], 0.5, scenario.filter_q, b["predicted_mean"], b["predicted_cov"])
         assert bits(belief) == bits(after.belief)
 

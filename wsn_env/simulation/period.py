@@ -8,6 +8,7 @@ from wsn_env.compiled import draws
 from wsn_env.compiled.elementary import expected_error
 from wsn_env.compiled.kernels import kernel, lean_kernel, lean_piece
 from wsn_env.filters.kernels import filter_row, make_scratch, redraw_row
+from wsn_env.filters.surprise import note_surprise
 from wsn_env.models.measurement.base import (
     AtHead,
     Memory,
@@ -26,9 +27,6 @@ from wsn_env.simulation.faults import fail_nodes, hold_back, what_is_sensed
 from wsn_env.simulation.geometry import nearest_living
 from wsn_env.simulation.lifetime import count_life
 from wsn_env.simulation.messages import Episode
-
-LEAST_LEARNT, MOST_SURPRISE = 0.01, 100.0
-REMEMBERED = 0.2  # share of the last period in the mean
 
 
 @kernel
@@ -332,7 +330,7 @@ def _settle(episode, r, t):
     mean, cov = belief.mean, belief.cov
     _remove_dead_nodes(episode, r)
     if state.row[b].period > 0 and state.reports.count[b] > 0:  # in period 0 nothing was predicted
-        _note_surprise(belief)
+        note_surprise(belief)
     total = 0.0
     for joules in out.energy_j:
         total += joules
@@ -354,22 +352,6 @@ def _settle(episode, r, t):
         predict_mixture(mean, cov, belief.mode_probabilities, t, belief.predicted_mean, belief.predicted_cov)
     else:
         predict_moments(mean, cov, t.period_s, t.q, belief.predicted_mean, belief.predicted_cov)
-
-
-@lean_piece
-def _note_surprise(belief):
-    """How far a period's reports have moved the estimate, over what was expected, with the positions' covariances P
-
-        |x - x_predicted|^2 / (tr P_predicted - tr P)
-
-    whose mean is about 1 where the filter's model holds; averaged over the last few periods with reports.
-    """
-    mean, cov, predicted, before = belief.mean, belief.cov, belief.predicted_mean, belief.predicted_cov
-    spread = before[0, 0] + before[2, 2]
-    learnt = spread - cov[0, 0] - cov[2, 2]
-    if learnt > LEAST_LEARNT * spread:
-        moved = (mean[0] - predicted[0]) ** 2 + (mean[2] - predicted[2]) ** 2
-        belief.surprise += REMEMBERED * (min(moved / learnt, MOST_SURPRISE) - belief.surprise)
 
 
 @lean_piece
