@@ -31,8 +31,7 @@ def imagined_world(scenario: Scenario, periods: int, particles: int) -> World:
         particles: of a particle filter; 0: a `GaussianTracker`, which cannot read binary sensors.
     """
     changes: dict[str, Any] = dict(periods=periods, motion="straight", filter_q=scenario.filter_q, faults=None)
-    changes["manoeuvre_q"] = None  # its filters have one mode
-    changes |= dict(tracker="particle", particles=max(particles, 2), gate_m=None)
+    changes |= dict(tracker="particle", particles=max(particles, 2), gate_m=None, manoeuvre_q=None)
     if scenario.radio.handover == "particles":  # as many as there really are
         changes |= dict(handover="estimate", handover_bits=scenario.handover_bits)
     world = World(scenario.override(**changes), threads=1)

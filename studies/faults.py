@@ -181,7 +181,7 @@ def filter_table(filters: dict[tuple[str, str], Evaluation]) -> str:
 
 
 def draw_costs(played: dict[str, Evaluation], path: Path) -> None:
-    """Picture: cost of the policies over that of none of the faults, a panel a fault."""
+    """Picture: what the policies cost by the strength of each fault, a panel a fault."""
     import matplotlib
 
     matplotlib.use("Agg")

@@ -37,14 +37,13 @@ from wsn_env.models.library import FAULTS
 from wsn_env.models.measurement.beacon import OF_RECEIVERS
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.scenario.scenario import BY_NAME, MOST_LAM, named_scenarios
-from wsn_env.scenario.tracking import ROBUST, TRACKERS, Tracking, reads
+from wsn_env.scenario.tracking import PARTICLE_ONLY, ROBUST, TRACKERS, Tracking, reads
 
 FOUND = Path(__file__).with_name("fuzz_found.json")
 ROWS = 3
 HANG_S = 150  # longer than kernels take to compile
 SMALL = dict(nodes=60, periods=12, particles=300, candidates=20)  # at most so many: a case is short
 LENGTHS = ("_m", "_ms", "_ms2")  # endings of what grows with the world
-PARTICLE_ONLY = ("silent_information", "resampling", "redraw_on_handover", "velocity_s", "manoeuvre_q", *ROBUST)
 
 
 @dataclass(frozen=True)

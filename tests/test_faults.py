@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from tests.worlds import assert_same, keys_of
+from tests.worlds import assert_same, expected, keys_of
 from wsn_env import Cluster, Scenario, View, World, evaluate, make_policy
 from wsn_env.compiled import draws
 from wsn_env.filters.particle import ParticleTracker
@@ -358,25 +358,34 @@ def test_a_bad_link_costs_every_try():
 # --- the target -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("fault", "away"), [("stops,stops=1,stop_s=9", 9), ("excursion,outside_m=15", None)])
-def test_the_target_goes_on_as_it_would_have_gone(fault, away):
-    sound, struck = (World(faulty(faults, motion="waypoint")).reset(keys_of(6, ROWS)).track for faults in ([], fault))
-    changed = 0
-    for mine, other in zip(sound, struck, strict=True):
-        first = int(np.argmax((mine != other).any(axis=1)))
-        changed += first > 0
-        steps = np.linalg.norm(np.diff(other[:, ::2], axis=0), axis=1)
-        assert steps.max() <= 1 + 1e-9  # 1 m/s, and no jumps
-        if away is None:
-            outside = np.maximum(-other[:, ::2], other[:, ::2] - 100).max(axis=1)
-            back = np.flatnonzero(outside > 0)
-            if len(back) and back[-1] < PERIODS:  # came back in time
-                assert 14 <= outside.max() <= 16
-        else:
-            last = min(first + away, PERIODS + 1)
-            assert (other[first:last, ::2] == other[first - 1, ::2]).all() and not other[first:last, 1::2].any()
-            np.testing.assert_array_equal(other[last:], mine[first : PERIODS + 1 - away])
-    assert changed > ROWS / 2
+def tracks_of(fault):
+    """Of waypoints at 1 m/s, without the fault and with it, and where they part: the last instant that both have."""
+    usual = dict(motion="waypoint", periods=300)
+    sound, struck = (World(faulty(each, **usual)).reset(keys_of(6, ROWS)).track for each in ([], fault))
+    parts = [int(np.argmax((a != b).any(axis=1))) - 1 for a, b in zip(sound, struck)]
+    assert np.linalg.norm(np.diff(struck[:, :, ::2], axis=1), axis=2).max() <= 1 + 1e-9  # no jumps
+    return zip(sound, struck, parts, strict=True)
+
+
+def test_a_target_that_stops_goes_on_as_it_would_have_gone():
+    for sound, struck, last in tracks_of("stops,stops=1,stop_s=9"):
+        end = min(last + 10, 301)
+        assert (struck[last + 1 : end, ::2] == struck[last, ::2]).all() and not struck[last + 1 : end, 1::2].any()
+        np.testing.assert_array_equal(struck[end:], sound[last + 1 : 301 - (end - last - 1)])
+
+
+def test_a_target_that_leaves_comes_back_to_where_it_turned_and_goes_on():
+    returned = 0
+    for sound, struck, last in tracks_of("excursion,outside_m=15"):
+        turn = last + 1  # there only the velocity is another
+        x, y = sound[turn, ::2]
+        out = int(np.ceil(min(x, 100 - x, y, 100 - y) + 15))  # at 1 m/s
+        if turn + 2 * out <= 300:
+            beyond = np.maximum(-struck[:, ::2], struck[:, ::2] - 100).max(axis=1)
+            assert beyond.argmax() == turn + out and 15 <= beyond.max() < 16
+            np.testing.assert_array_equal(struck[turn + 2 * out :], sound[turn : 301 - 2 * out])
+            returned += 1
+    assert returned > ROWS / 2
 
 
 # --- what there is no more ------------------------------------------------------------------------------------
@@ -577,16 +586,15 @@ def test_a_robust_filter_is_refused_where_it_would_do_nothing():
         faulty(tracker="ekf", outlier_share=0.1)
 
 
-def test_policies_expect_less_of_nodes_that_may_stand_elsewhere():
-    costs = []
-    for node_sd_m in (0.0, 3.0):
-        scenario = faulty(node_sd_m=node_sd_m, lam=4.0, particles=300, nodes=225)
-        world, policy = World(scenario, threads=1), make_policy("greedy", scenario)
-        state = world.reset(keys_of(8, 50))
-        for _ in range(20):
-            state, outcome = world.step(state, policy.act(View.of(state)))
-        costs.append(outcome.members.mean())
-    assert costs[0] != costs[1]
+@pytest.mark.parametrize(("measurement", "steepness"), [("position", 1.0), ("rssi", None)])
+def test_what_is_expected_of_a_report_knows_that_its_node_may_stand_elsewhere(measurement, steepness):
+    """Its variance grows by node_sd_m^2 H H'."""
+    place, mean, cov = np.array([[46.0, 47.0]]), (50, 0, 50, 0), np.diag([0.01, 0.01, 0.01, 0.01])
+    sure, unsure = (expected(faulty(measurement=measurement, node_sd_m=sd), place, mean, cov)[0] for sd in (0.0, 3.0))
+    for k in range(sure["numbers"]):
+        slope = sure["slope_x"][k] ** 2 + sure["slope_y"][k] ** 2
+        assert slope > 0 and (steepness is None or slope == steepness)
+        assert unsure["variance"][k] == pytest.approx(sure["variance"][k] + 9 * slope)
 
 
 def test_draws_of_faults_have_purposes_of_their_own():

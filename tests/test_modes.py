@@ -5,7 +5,8 @@ import pytest
 from numba import njit
 
 from tests.worlds import assert_same, keys_of
-from wsn_env import Scenario, View, World, make_policy
+from wsn_env import Cluster, Scenario, View, World, make_policy
+from wsn_env.agents.imagined import imagined_world
 from wsn_env.compiled import draws
 from wsn_env.envs.features import BELIEF_FEATURES, MOTION_FEATURES
 from wsn_env.envs.observations import make_observation
@@ -148,10 +149,31 @@ def test_observations_tell_of_the_motion():
 
 
 def test_a_policy_that_knows_of_no_modes_plays_with_them():
-    scenario = scenario_of("crossing", particles=200, periods=5)
-    world, policy = World(scenario, threads=1), make_policy("ppo", scenario)
-    state, outcome = world.step(world.reset([1]), policy.act(View.of(world.reset([1]))))
-    assert outcome.error_m[0] < 10
+    """As it would without, seeing the same."""
+    scenario = scenario_of("crossing", particles=200)
+    usual, policy = make_policy("ppo", scenario.override(manoeuvre_q=None)), make_policy("ppo", scenario)
+    world = World(scenario, threads=1)
+    state = world.reset(keys_of(1, 20))
+    for _ in range(10):
+        choice = policy.act(View.of(state))
+        assert_same(choice, usual.act(View.of(state)))
+        state, _ = world.step(state, choice)
+
+
+def test_a_head_that_draws_its_particles_anew_draws_modes_too():
+    """Of the mean and the covariance handed over nobody knows the modes."""
+    scenario = scenario_of("circle", redraw_on_handover=True, particles=32 * 50, nodes=400)
+    world = World(scenario, threads=1)
+    state = world.reset(keys_of(1, 4))
+    everybody = np.tile(np.arange(400), (4, 1))
+    for _ in range(40):
+        state, _ = world.step(state, Cluster(np.zeros(4, int), everybody))
+    assert (np.bincount(state.belief.modes.ravel(), minlength=COUNT) / state.belief.modes.size)[2] > 0.3  # turning
+    state, outcome = world.step(state, Cluster(np.full(4, 30), np.full((4, 0), -1)))  # the new head hears nothing
+    assert outcome.handover.all() and (outcome.delivered <= 1).all()
+    moved = (1 - LEAVES) * SHARES + (LEAVES * SHARES).sum() * SHARES
+    for row in range(4):
+        assert np.bincount(state.belief.modes[row], minlength=COUNT) / 1600 == pytest.approx(moved, abs=0.05)
 
 
 def test_without_modes_nothing_is_kept_of_them():
@@ -172,6 +194,7 @@ def test_a_batch_has_the_bits_of_its_rows():
 
 def test_the_planner_plans_with_one_mode():
     scenario = scenario_of(particles=200, periods=3)
+    assert imagined_world(scenario, 3, 0).scenario.tracking.manoeuvre_q is None
     world, policy = World(scenario, threads=1), make_policy("planner", scenario)
     state = world.reset([3])
     for _ in range(3):

@@ -1,16 +1,18 @@
 """The studies' tables, from small runs."""
 
 import re
+import shutil
 import sys
 
 import numpy as np
 import pytest
 
-from studies import ablations, lifetime, seeds, tables, transfer
+from studies import ablations, faults, lifetime, seeds, tables, transfer
 from studies.report import draw_curves, learning_curve, over_seeds, table
 from tests.figures import check_tables
 from wsn_env import Scenario
 from wsn_env.agents.ppo import PRETRAINED
+from wsn_env.models.library import FAULTS
 from wsn_env.scenario import named_scenarios
 
 SMALL = "particles=50 nodes=40 side_m=50 crossing_m=20 periods=10".split()
@@ -108,3 +110,21 @@ def test_every_scenario_and_shipped_policy_is_in_a_table():
 def test_an_unknown_table_is_named(capsys):
     assert tables.main(["--only", "honestly"]) == 2
     assert "honestly" in capsys.readouterr().err
+
+
+def test_every_fault_is_played_at_three_strengths(tmp_path, monkeypatch):
+    """The study in short: two faults, two filters, two episodes; a second call finds nothing left of the first."""
+    assert faults.STRENGTHS.keys() == FAULTS.kinds.keys()
+    assert all(len(settings) == 3 for settings in faults.STRENGTHS.values())
+    monkeypatch.setattr(faults, "STRENGTHS", {name: faults.STRENGTHS[name] for name in ("late", "stops")})
+    monkeypatch.setattr(faults, "FILTERS", {"nothing": {}, "gate_sds=3": dict(gate_sds=3.0)})
+    monkeypatch.setattr(faults, "POLICIES", ("nearest2", "ppo"))
+    trained = tmp_path / "again"
+    shutil.copytree(PRETRAINED / "PreDC-v0", trained)
+    faults.main(["--episodes", "2", "--trained", str(trained), "--out", str(tmp_path / "out")])
+    names = {"costs.png", *(f"{name}.md" for name in ("policies", "measures", "retrained", "filters"))}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == names
+    rows = (tmp_path / "out" / "retrained.md").read_text().splitlines()[2:]
+    assert len(rows) == 3 and all("+0.0 % (+0.0 to +0.0)" in row for row in rows)  # the same policy
+    costs = (tmp_path / "out" / "policies.md").read_text().splitlines()
+    assert len(costs) == 2 + 1 + 6 + 1 and costs[-1].startswith("| mean rank over the faults |")

@@ -260,6 +260,7 @@ def redraw_row(key: Any, period: int, belief: Any, b: int) -> None:
         x[0, i], x[1, i] = F(mean[0]) + d0, F(mean[1]) + d1
         x[2, i], x[3, i] = F(mean[2]) + d2, F(mean[3]) + d3
     belief.log_weights[b, :] = F(0)
+    allot_modes(belief.modes[b], belief.row[b].mode_probabilities)  # of which a handover tells nothing
 
 
 @kernel

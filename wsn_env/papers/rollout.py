@@ -129,17 +129,6 @@ def _play_block(world: World, policy: Policy, runs: range, tick: Callable[[], No
     return tuple(np.stack(arrays, axis=1) for arrays in zip(*periods, strict=True))
 
 
-def periods_until_dead(record: Record, nodes: int, share: float) -> np.ndarray:
-    """(R,) the period in which this share of the nodes has died; all of them where it never happens."""
-    dead = record.alive <= (1 - share) * nodes
-    return np.where(dead.any(axis=1), dead.argmax(axis=1) + 1, dead.shape[1])
-
-
-def mean_and_error(counts: np.ndarray) -> str:
-    """Mean of whole numbers over the runs, and its standard error."""
-    return f"{counts.mean():.0f} ({standard_error(counts):.0f})"
-
-
 def pooled_rms(square: np.ndarray) -> Measured:
     """Root of the mean of squares (R, K), with its standard error over the runs."""
     return Measured.root_mean(square.mean(axis=1))

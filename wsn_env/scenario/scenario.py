@@ -35,7 +35,7 @@ from wsn_env.models.radio.radio import Radio
 from wsn_env.models.recordings.calibration_file import read_quantities
 from wsn_env.scenario.named import faults_named, kind_named
 from wsn_env.scenario.quantities import Quantities
-from wsn_env.scenario.tracking import BOUNDARY_TRACKERS, ROBUST, Tracking, reads
+from wsn_env.scenario.tracking import Tracking
 
 PARTS: dict[str, type] = {
     "name": str,
@@ -117,11 +117,9 @@ class Scenario(Section):
             raise ScenarioError(f"Scenario.unscored = {self.unscored}: must be below periods = {self.periods}")
         if self.ends_outside and self.unscored:
             raise ScenarioError(f"Scenario.unscored = {self.unscored}: must be 0 with ends_outside = True")
-        self._check_tracker()
-        self._check_robust()
-        checked: tuple[Any, ...] = self.detection, self.measurement, self.radio, *self.faults
-        for kind in checked:
-            kind.check(self)
+        checked: tuple[Any, ...] = self.tracking, self.detection, self.measurement, self.radio, *self.faults
+        for part in checked:
+            part.check(self)
         self.motion.check_measurement(self.measurement)
 
     def _take_faults(self) -> None:
@@ -135,48 +133,6 @@ class Scenario(Section):
         for fault in faults or ():
             fault.check_functions()
         object.__setattr__(self, "faults", faults)
-
-    def _check_tracker(self) -> None:
-        name, kind = self.tracking.tracker, type(self.measurement)
-        if not reads(name, self.measurement):
-            kinds: dict[str, Any] = dict(MEASUREMENTS.kinds)
-            able = [known for known, its_kind in kinds.items() if reads(name, its_kind())]
-            allowed = "allowed are the measurements" if len(able) > 1 else "allowed is the measurement"
-            raise ScenarioError(
-                f"Tracking.tracker = {name!r}: cannot read {kind.__name__} reports; {allowed} {' and '.join(able)}"
-            )
-        if name in BOUNDARY_TRACKERS and not name.startswith("centroid"):
-            reports = getattr(self.measurement, "reports", "changes")
-            if reports != "changes":
-                raise ScenarioError(f"Binary.reports = {reports!r}: allowed is 'changes' with the tracker {name!r}")
-        needless = {
-            "silent_information": name != "particle",
-            **dict.fromkeys(ROBUST, name != "particle"),
-            "resampling": name != "particle",
-            "redraw_on_handover": name != "particle",
-            "velocity_s": name != "particle",
-            "manoeuvre_q": name != "particle" or self.tracking.velocity_s is not None,
-            "gate_m": name not in BOUNDARY_TRACKERS,
-        }
-        usual = {item.name: item.default for item in fields(self.tracking)}
-        wrong = [item for item, idle in needless.items() if idle and getattr(self.tracking, item) != usual[item]]
-        if wrong:
-            given = ", ".join(f"Tracking.{item} = {getattr(self.tracking, item)!r}" for item in wrong)
-            allowed = ", ".join(repr(usual[item]) for item in wrong)
-            raise ScenarioError(f"{given}: allowed is {allowed} with the tracker {name!r}, which makes no use of it")
-
-    def _check_robust(self) -> None:
-        """What reckons with wrong reports weighs them one by one; a gate leaves some out."""
-        tracking, kind = self.tracking, type(self.measurement)
-        if tracking.robust and kind.weigh_period is not Measurement.weigh_period:
-            given = ", ".join(f"Tracking.{name} = {getattr(tracking, name)}" for name in ROBUST)
-            raise ScenarioError(f"{given}: allowed is None, 0, 0 with {kind.__name__}, which weighs a period at once")
-        for name, needed in (("fusion", "joint"), ("silent_information", False)):
-            given = getattr(tracking, name)
-            if tracking.gate_sds is not None and given != needed:
-                raise ScenarioError(
-                    f"Tracking.{name} = {given!r}: allowed is {needed!r} with gate_sds, which leaves reports out"
-                )
 
     @property
     def kinds(self) -> tuple[Kind, ...]:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, Literal
 
+from wsn_env.models.library import MEASUREMENTS
 from wsn_env.models.measurement.base import Measurement
-from wsn_env.models.quantity import Section, quantity
+from wsn_env.models.quantity import ScenarioError, Section, quantity
+
+if TYPE_CHECKING:
+    from wsn_env.scenario.scenario import Scenario
 
 BOUNDARY_TRACKERS = ("boundary_raw", "boundary", "boundary_mid", "boundary_ekf", "centroid", "centroid_rls")
 TRACKERS = {  # name: where the class stands
@@ -23,6 +27,7 @@ TRACKERS = {  # name: where the class stands
     **dict.fromkeys(BOUNDARY_TRACKERS, "wsn_env.filters.boundary:BoundaryTracker"),
 }
 ROBUST = ("gate_sds", "outlier_share", "node_sd_m")  # what reckons with wrong reports
+PARTICLE_ONLY = ("silent_information", *ROBUST, "resampling", "redraw_on_handover", "velocity_s", "manoeuvre_q")
 STRENGTHS = ("grnn", "grnn_kf")  # trackers that read values of one number
 RANGES = ("trilateration", "nonlinear_ls")  # that turn a value into a distance
 
@@ -150,3 +155,47 @@ class Tracking(Section):
     def robust(self) -> bool:
         """Whether the likelihood reckons with wrong reports."""
         return self.gate_sds is not None or self.outlier_share > 0 or self.node_sd_m > 0
+
+    def check(self, scenario: Scenario) -> None:
+        """Raise ScenarioError where it does not fit the rest of the scenario."""
+        self._check_tracker(scenario.measurement)
+        self._check_robust(scenario.measurement)
+        if self.manoeuvre_q is not None and self.velocity_s is not None:
+            raise ScenarioError(
+                f"Tracking.manoeuvre_q = {self.manoeuvre_q}: allowed is None with velocity_s, a motion of its own"
+            )
+
+    def _check_tracker(self, measurement: Measurement) -> None:
+        name = self.tracker
+        if not reads(name, measurement):
+            kinds: dict[str, Any] = dict(MEASUREMENTS.kinds)
+            able = [known for known, its_kind in kinds.items() if reads(name, its_kind())]
+            allowed = "allowed are the measurements" if len(able) > 1 else "allowed is the measurement"
+            kind = type(measurement).__name__
+            raise ScenarioError(
+                f"Tracking.tracker = {name!r}: cannot read {kind} reports; {allowed} {' and '.join(able)}"
+            )
+        if name in BOUNDARY_TRACKERS and not name.startswith("centroid"):
+            reports = getattr(measurement, "reports", "changes")
+            if reports != "changes":
+                raise ScenarioError(f"Binary.reports = {reports!r}: allowed is 'changes' with the tracker {name!r}")
+        of_others = () if name == "particle" else PARTICLE_ONLY
+        idle = of_others if name in BOUNDARY_TRACKERS else (*of_others, "gate_m")
+        usual = {item.name: item.default for item in fields(self)}
+        wrong = [item for item in idle if getattr(self, item) != usual[item]]
+        if wrong:
+            given = ", ".join(f"Tracking.{item} = {getattr(self, item)!r}" for item in wrong)
+            allowed = ", ".join(repr(usual[item]) for item in wrong)
+            raise ScenarioError(f"{given}: allowed is {allowed} with the tracker {name!r}, which makes no use of it")
+
+    def _check_robust(self, measurement: Measurement) -> None:
+        """What reckons with wrong reports weighs them one by one; a gate leaves some out."""
+        if self.robust and type(measurement).weigh_period is not Measurement.weigh_period:
+            given, kind = (f"Tracking.{name} = {getattr(self, name)}" for name in ROBUST), type(measurement).__name__
+            raise ScenarioError(f"{', '.join(given)}: allowed is None, 0, 0 with {kind}, which weighs a period at once")
+        for name, needed in (("fusion", "joint"), ("silent_information", False)):
+            if self.gate_sds is not None and getattr(self, name) != needed:
+                raise ScenarioError(
+                    f"Tracking.{name} = {getattr(self, name)!r}: allowed is {needed!r} with gate_sds, which leaves"
+                    " reports out"
+                )

@@ -9,24 +9,16 @@ from wsn_env.compiled.elementary import expected_error
 from wsn_env.compiled.kernels import kernel, lean_kernel, lean_piece
 from wsn_env.filters.kernels import filter_row, make_scratch, redraw_row
 from wsn_env.filters.surprise import note_surprise
-from wsn_env.models.measurement.base import (
-    AtHead,
-    Memory,
-    finds_target,
-    log_miss,
-    news,
-    node_at,
-    predict_reports,
-    take_note,
-)
+from wsn_env.models.measurement.base import AtHead, finds_target, log_miss, predict_reports
 from wsn_env.models.motion.modes import predict_mixture
 from wsn_env.models.motion.prediction import predict_moments, predict_walk
 from wsn_env.models.state import KEEP_CLUSTER, KEEP_HEAD, NOBODY, belief_at, state_at
 from wsn_env.simulation import messages
-from wsn_env.simulation.faults import fail_nodes, hold_back, what_is_sensed
+from wsn_env.simulation.faults import fail_nodes
 from wsn_env.simulation.geometry import nearest_living
 from wsn_env.simulation.lifetime import count_life
 from wsn_env.simulation.messages import Episode
+from wsn_env.simulation.sensing import memory_of, send_late, sense, target_of, wake
 
 
 @kernel
@@ -94,13 +86,6 @@ def conclude(
 
 
 @lean_piece
-def target_of(state: Any, b: int) -> tuple[float, float]:
-    """The true position (x, y) in the present period [m]."""
-    k = min(state.row[b].period, state.track.shape[1] - 1)
-    return state.track[b, k, 0], state.track[b, k, 2]
-
-
-@lean_piece
 def _sense_and_report(head, chosen, episode, c):
     """From the choice to the reports: cluster, target, detections, packets, and what was missed.
 
@@ -125,7 +110,7 @@ def _sense_and_report(head, chosen, episode, c):
             if wake(node, messages.SENSING, episode, c.radio):
                 sense(node, head, messages.REPORT, target, episode, c)
     if head >= 0 or not c.radio.to_head:
-        _send_late(head, episode, c)
+        send_late(head, episode, c)
     if head >= 0 and state.residual_j[b, head] <= 0.0:
         messages.note_residual(head, episode)
     if c.radio.asleep_j > 0.0:
@@ -199,13 +184,6 @@ def _list_living(chosen, residual_j, found):
 
 
 @lean_piece
-def wake(node: Any, purpose: Any, episode: Episode, r: Any) -> bool:
-    """A node pays for being awake in this period. Returns whether it could."""
-    state, b = episode.state, episode.b
-    return state.residual_j[b, node] > 0.0 and messages.spend(node, r.awake_j, purpose, episode)
-
-
-@lean_piece
 def _sleep(episode, r):
     """All nodes outside the cluster that are taken for alive pay for the period, too."""
     state, b = episode.state, episode.b
@@ -217,63 +195,6 @@ def _sleep(episode, r):
         awake = node == standing.head or (j < standing.n_members and members[j] == node)
         if not awake and battery[node] > 0.0:
             messages.spend(node, r.asleep_j, messages.SENSING, episode)
-
-
-@lean_piece
-def sense(node: Any, head: Any, purpose: Any, target: Any, episode: Episode, c: Any) -> None:
-    """An awake node's period: it reports what it has to tell, if anything."""
-    state, b, out = episode
-    if state.residual_j[b, node] <= 0.0:
-        return
-    sensor = node_at(state.network.positions[b], node)
-    occasion, x, y = what_is_sensed(state, b, sensor, purpose == messages.SEARCH, target, c)
-    has_news, value, second, packets = news(c.measurement, memory_of(state, b), occasion, sensor, x, y, c)
-    if not has_news:
-        return
-    out.detections += 1
-    is_heads = c.radio.to_head and node == head
-    sends, report = hold_back(state, b, node, (value, second, packets), is_heads)
-    if sends and messages.report(node, head, report[2], purpose, episode, c.radio):
-        _take_report(state.reports.count[b], node, report, episode, c)
-
-
-@lean_piece
-def _take_report(slot, node, report, episode, c):
-    """The head has a report, which stands at a place in the list."""
-    state, b = episode.state, episode.b
-    reports, (value, second, _) = state.reports, report
-    reports.node[b, slot] = node
-    reports.value[b, slot, 0] = value
-    reports.value[b, slot, 1] = second
-    reports.count[b] += 1
-    take_note(c.measurement, memory_of(state, b), node, value)
-
-
-@lean_piece
-def _send_late(head, episode, c):
-    """What has waited since the last period is sent, by nodes that have made nothing newer; each to its place."""
-    state, b = episode.state, episode.b
-    condition, reports, slot = state.condition[b], state.reports, 0
-    for number in range(len(condition)):
-        own, node = condition[number], np.int64(number)
-        while slot < reports.count[b] and reports.node[b, slot] < node:
-            slot += 1
-        waits = own.waiting > 0 and own.waiting == state.row[b].period - 1 and state.residual_j[b, node] > 0.0
-        if waits:
-            own.waiting = 0
-        if waits and messages.report(node, head, own.packets, messages.REPORT, episode, c.radio):
-            for k in range(reports.count[b], slot, -1):
-                reports.node[b, k] = reports.node[b, k - 1]
-                reports.value[b, k, 0] = reports.value[b, k - 1, 0]
-                reports.value[b, k, 1] = reports.value[b, k - 1, 1]
-            _take_report(slot, node, (own.value[0], own.value[1], own.packets), episode, c)
-
-
-@lean_piece
-def memory_of(state: Any, b: int) -> Any:
-    """What a row's nodes and their head keep of states and packets."""
-    instant = min(state.row[b].period, state.packets.shape[1] - 1)
-    return Memory(state.sensed[b], state.reports.bitmap[b], state.packets[b, instant])
 
 
 @lean_piece

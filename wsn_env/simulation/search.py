@@ -11,7 +11,7 @@ from wsn_env.models.state import state_at
 from wsn_env.simulation import messages
 from wsn_env.simulation.faults import what_is_sensed
 from wsn_env.simulation.messages import Episode
-from wsn_env.simulation.period import sense, target_of
+from wsn_env.simulation.sensing import sense, target_of
 
 
 @lean_kernel
@@ -75,10 +75,12 @@ def _wake_all(episode, c):
         if network.battery[b, node] <= 0.0:
             continue
         # Of those that are dead, unknown to the network, it reckons with the same: it cannot tell them from others.
-        living, heard = residual_j[node] > 0.0, messages.spend(node, call, messages.SEARCH, episode)
-        left = residual_j[node] > 0.0
-        woken = awake or messages.spend(node, c.radio.awake_j, messages.SEARCH, episode)
-        if not (living and heard and woken) or not (awake or left):
+        living = residual_j[node] > 0.0
+        woken = messages.spend(node, call, messages.SEARCH, episode) and living
+        if not awake:
+            living = residual_j[node] > 0.0
+            woken = messages.spend(node, c.radio.awake_j, messages.SEARCH, episode) and living
+        if not woken:
             continue
         out.members += 1
         sensor = node_at(positions, node)

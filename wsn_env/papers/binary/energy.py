@@ -10,9 +10,10 @@ import numpy as np
 from wsn_env.evaluation.intervals import Measured
 from wsn_env.papers.binary.readings import even_period_s, transmitting_nodes
 from wsn_env.papers.binary.results import Results
-from wsn_env.papers.binary.systems import LIFETIMES, NODES, PERIODS_S, RADII_M, Setting, vary
+from wsn_env.papers.binary.systems import LIFETIMES, NODES, PERIODS_S, RADII_M, Setting, lifetime_trial, vary
 from wsn_env.papers.claim import Claim, judge_claim
-from wsn_env.papers.rollout import SIGNIFICANT, exceeds, keeps_falling, mean_and_error
+from wsn_env.papers.lifetimes import judge_lifetimes
+from wsn_env.papers.rollout import SIGNIFICANT, exceeds, keeps_falling
 
 STEADY_SHARE = 0.05  # a count that changes by less does not change
 
@@ -98,11 +99,6 @@ def _over_periods(results: Results) -> Iterator[Claim]:
 
 def judge_lifetime(results: Results) -> Claim:
     """How long the network lasts, which the paper does not measure."""
-    longer, parts = [], []
-    for share, what in ((1e-9, "the first node"), (0.1, "a tenth"), (0.5, "half of them")):
-        boundary, centroid = (results.dead_at(system, share) for system in LIFETIMES)
-        longer.append(exceeds(boundary, centroid))
-        parts.append(f"{what} after {mean_and_error(boundary)} against {mean_and_error(centroid)} periods")
-    ours = f"with batteries of 5 mJ and a target that never leaves, dead: {', '.join(parts)}"
     what = "the network lasts longer with the boundary method than with the centroid"
-    return Claim(what, "no figure", ours, judge_claim(all(longer), longer[-1]))
+    nodes = lifetime_trial(LIFETIMES[0], results.runs).scenario.field.nodes
+    return judge_lifetimes(what, "no figure", "5 mJ", nodes, *(results.lifetimes[system] for system in LIFETIMES))

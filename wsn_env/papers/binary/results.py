@@ -9,7 +9,7 @@ import numpy as np
 from wsn_env.evaluation.intervals import Measured
 from wsn_env.evaluation.progress import Progress
 from wsn_env.papers.binary.systems import FAULTS, LIFETIMES, PERIODS_S, RADII, SETTINGS, Setting, lifetime_trial
-from wsn_env.papers.rollout import Record, periods_until_dead, play_all, pooled_rms
+from wsn_env.papers.rollout import Record, play_all, pooled_rms
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,11 +48,6 @@ class Results:
     def energy_mj(self, setting: Setting) -> np.ndarray:
         """(R,) mean energy of a period of each run."""
         return self.records[setting].energy_mj[:, setting.steady].mean(axis=1)
-
-    def dead_at(self, system: str, share: float) -> np.ndarray:
-        """(R,) the period in which this share of the nodes has died."""
-        nodes = lifetime_trial(system, self.runs).scenario.field.nodes
-        return periods_until_dead(self.lifetimes[system], nodes, share)
 
     def crossing_s(self, system: str) -> Measured:
         """The sampling period from which the centroid has the lower RMS; NaN: none up to the longest."""

@@ -11,7 +11,8 @@ import numpy as np
 
 from wsn_env.evaluation.intervals import standard_error
 from wsn_env.papers.claim import Claim, judge_claim
-from wsn_env.papers.rollout import Record, exceeds, mean_and_error
+from wsn_env.papers.lifetimes import judge_lifetimes
+from wsn_env.papers.rollout import Record, exceeds
 from wsn_env.papers.underwater.expected import HARMLESS, KEEPS, LOSES, rmse_ratio
 from wsn_env.papers.underwater.systems import (
     HANDOVERS,
@@ -23,6 +24,7 @@ from wsn_env.papers.underwater.systems import (
     SMOOTH,
     THRESHOLDS_DB,
     Results,
+    lifetime_trial,
     lost,
 )
 
@@ -212,11 +214,7 @@ def _hysteresis(results: Results) -> Claim:
 
 
 def _lifetime(results: Results) -> Claim:
-    longer, parts = [], []
-    for share, what in ((1e-9, "the first node"), (0.1, "a tenth"), (0.5, "half of them")):
-        base, calm = (results.dead_at(db, share) for db in LIFETIMES_DB)
-        longer.append(exceeds(calm, base))
-        parts.append(f"{what} after {mean_and_error(calm)} against {mean_and_error(base)} periods")
-    ours = f"with batteries of 30 J and a target that never leaves, dead: {', '.join(parts)}"
+    without, calm = (results.lifetime(db) for db in LIFETIMES_DB)
     what = "With 3 dB of hysteresis the network lasts longer than without"
-    return Claim(what, "-", ours, judge_claim(all(longer), longer[-1]))
+    nodes = lifetime_trial(LIFETIMES_DB[0], results.runs).scenario.field.nodes
+    return judge_lifetimes(what, "-", "30 J", nodes, calm, without)

@@ -11,7 +11,7 @@ import numpy as np
 from wsn_env.compiled import draws
 from wsn_env.evaluation.progress import Progress
 from wsn_env.evaluation.rollout import FIRST_SEED
-from wsn_env.papers.rollout import Record, Trial, periods_until_dead, play_all
+from wsn_env.papers.rollout import Record, Trial, play_all
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World
@@ -127,10 +127,9 @@ class Results:
         """A head with so much hysteresis."""
         return self.records[hysteresis_trial(hysteresis_db, self.runs)]
 
-    def dead_at(self, hysteresis_db: float, share: float) -> np.ndarray:
-        """(R,) the period in which this share of the nodes has died, with so much hysteresis."""
-        trial = lifetime_trial(hysteresis_db, self.runs)
-        return periods_until_dead(self.records[trial], trial.scenario.field.nodes, share)
+    def lifetime(self, hysteresis_db: float) -> Record:
+        """The same with small batteries."""
+        return self.records[lifetime_trial(hysteresis_db, self.runs)]
 
     def start(self, noise: float, start: str) -> Record:
         """A first head."""
