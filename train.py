@@ -38,18 +38,19 @@ from wsn_env.evaluation.versions import versions
 from wsn_env.learning.actor_critic import EntryPolicy, actor_network, entry_sizes
 from wsn_env.learning.checkpoints import Watch, check_finite, load_checkpoint
 from wsn_env.learning.concat_vector_env import ConcatVectorEnv
-from wsn_env.learning.defaults import default_level, default_node_counts, default_order
-from wsn_env.learning.levelling import LevelledRollout
+from wsn_env.learning.held_out import HeldOut
 from wsn_env.learning.network import PolicyNetwork
 from wsn_env.learning.priced_vector_env import PricedVectorEnv
+from wsn_env.learning.privileged import PrivilegedVectorEnv
 from wsn_env.learning.replayable import ReplayableRows
 from wsn_env.learning.run_folder import facts_of, open_folder, open_progress
 from wsn_env.learning.sb3 import SB3VecEnv
 from wsn_env.learning.training_reward import TrainingReward
+from wsn_env.learning.worlds import default_worlds, world_of
 from wsn_env.models.arguments import check_parameters
 from wsn_env.models.measurement.base import Order
 from wsn_env.models.own import own_error, own_place
-from wsn_env.models.quantity import check_quantity, parse_overrides
+from wsn_env.models.quantity import check_quantity
 from wsn_env.reports.pages.evaluation_page import write_report
 from wsn_env.reports.pictures import write_picture
 from wsn_env.reports.plots import draw_comparison
@@ -59,6 +60,7 @@ from wsn_env.scenario import Scenario
 
 SIZED = ("nearest", "informed")  # compared with each of SIZES
 SIZES = range(9)  # further members
+RIVALS = ("greedy", "adaptive", *(f"nearest{size}" for size in SIZES))  # of the learning curve
 PRICED = 32  # episodes in which the price of scarce energy is found
 PERIODS = 500_000  # of the comparison, unless another number of episodes is asked for
 SLOW = ("ppo", "planner")  # left out of the comparison: the one trained is in it, the other takes hours
@@ -81,7 +83,7 @@ class Training:
     vary: list[str] | None = None
     """Further scenarios to train in, each this one with some quantities changed: nodes=81 motion=turns,particles=1000
     nodes=81,faults=stuck,share=0.1 (faults last).
-    The rows are divided evenly among all. Left out: fewer and twice as many nodes, where they are drawn."""
+    The rows are divided evenly among all. Left out: those in which the scenario's policy is to hold."""
     action: Literal["menu", "subset"] = "menu"
     """What it chooses from."""
     order: Order | None = None
@@ -119,24 +121,24 @@ class Training:
     """Transitions in a minibatch."""
     epochs: int = 8
     """Passes over a rollout."""
-    learning_rate: float = 2e-3
+    learning_rate: float = 5e-3
     """At the start; falls linearly to 0."""
     gamma: float = 0.95
     """Discount per period."""
-    gae_lambda: float = 0.9
+    gae_lambda: float = 0.7
     """Of the generalised advantage estimate."""
-    level: float | None = None
-    """How far advantages are brought to one size, whatever the belief's width: 0: not at all; 1: wholly. Left out: by
-    what the nodes measure."""
     entropy: float = 5e-4
     """Weight of the entropy bonus."""
     network: Literal["entries", "flat"] = "entries"
     """entries: the same small network scores every entry of the choice, whatever their number; flat: one network of
     the whole observation."""
-    units: tuple[int, int] = (32, 32)
+    units: tuple[int, int] = (64, 32)
     """Units of its two hidden layers."""
     critic: tuple[int, int] = (64, 64)
     """Units of the two hidden layers of the value's network."""
+    privileged: bool | None = None
+    """Let the critic, which only serves training, see where the target goes and which scenario it is. Left out: with
+    the network "entries"; a flat one would show it to the actor, too."""
     seed: int = 0
     """Of training, below 2^31 - steps - rows; evaluation seeds lie above."""
     torch_threads: int = 1
@@ -144,6 +146,10 @@ class Training:
     runs; it also trains another policy, since sums are split otherwise."""
     checkpoint_steps: int = 500_000
     """Periods between checkpoints."""
+
+    points: int = 12
+    """Points of the learning curve, closer at first: its lead over the best rule on held-out episodes, at each of the
+    scenario's trade-offs; 0: none. None either where energy is scarce: its price is found at the end."""
 
     # comparison
     episodes: int | None = None
@@ -190,7 +196,7 @@ def train(settings: Training) -> None:
     rules = make_baselines(scenario) if settings.episodes else {}
     torch.set_num_threads(settings.torch_threads)
     observation: ObservationName = "menu" if settings.action == "menu" else "candidates"
-    order = settings.order or default_order(scenario)
+    order = settings.order or scenario.measurement.order
     interface = Settings(settings.action, observation, settings.reward, order)
     folder, values = settings.folder, settings_as_json(settings)
     open_folder(folder, values, settings.resume)
@@ -220,15 +226,15 @@ def complete_settings(settings: Training) -> Scenario:
     if len(settings.lam) > 2:
         raise ValueError(f"Training.lam = {settings.lam}: must be one number, or two that it is drawn between")
     if settings.order is None:
-        settings.order = default_order(scenario)
-    if settings.level is None:
-        settings.level = default_level(scenario)
+        settings.order = scenario.measurement.order
+    if settings.privileged is None:
+        settings.privileged = settings.network == "entries"
     if settings.steering is None:
         settings.steering = float(scenario.scarce_energy)
     if settings.episodes is None:
         settings.episodes = min(1000, PERIODS // scenario.periods)
     if settings.vary is None:
-        settings.vary = [f"nodes={nodes}" for nodes in default_node_counts(scenario)]
+        settings.vary = default_worlds(scenario)
     low, high = settings.lam[0], settings.lam[-1]
     return scenario.override(lam=low if len(settings.lam) == 1 else (low, high))
 
@@ -246,7 +252,10 @@ def learn_locally(settings: Training, scenario: Scenario, interface: Settings, f
         for record in pending:
             model.logger.record(*record)
         with progress_bar() as report:
-            watch = Watch(folder, settings.steps, settings.checkpoint_steps, facts, report)
+            held_out = make_held_out(settings, scenario, interface)
+            watch = Watch(
+                folder, settings.steps, settings.checkpoint_steps, facts, report, held_out, max(settings.points, 1)
+            )
             try:
                 model.learn(left, callback=watch, reset_num_timesteps=False)
             except (ValueError, RuntimeError):
@@ -263,6 +272,15 @@ def learn_locally(settings: Training, scenario: Scenario, interface: Settings, f
     return actor_network(model)
 
 
+def make_held_out(settings: Training, scenario: Scenario, interface: Settings) -> HeldOut | None:
+    """What the learning curve is made of."""
+    if settings.points == 0 or settings.steering:
+        return None
+    return HeldOut(
+        scenario, interface, {name: make_policy(name, scenario) for name in RIVALS}, trade_offs(settings, scenario)
+    )
+
+
 def learn_on_ray(settings: Training, scenario: Scenario, interface: Settings, folder: Path) -> PolicyNetwork:
     """RLlib's PPO."""
     try:
@@ -271,16 +289,17 @@ def learn_on_ray(settings: Training, scenario: Scenario, interface: Settings, fo
         raise ValueError(f"engine 'ray': pip install 'wsn_env[ray]' ({problem})") from None
 
     whole = make_envs(settings, scenario, interface, len(settings.vary or ()) + 1)
+    space: Any = whole.single_observation_space
+    seen = space.shape[0]
     training = RayTraining(
         lambda rows: make_envs(settings, scenario, interface, rows),
-        entry_sizes(settings.action, whole.interface.observation, settings.units, settings.critic),
+        entry_sizes(settings.action, whole.interface.observation, seen, settings.units, settings.critic),
         folder,
         steps=settings.steps,
         facts=facts_of(settings_as_json(settings), scenario, Path(__file__)),
         rows=settings.rows,
         runners=settings.runners,
         rollout=settings.rollout,
-        level=settings.level or 0.0,
         seed=settings.seed,
         address=settings.address,
         lr=[[0, settings.learning_rate], [settings.steps, 0.0]],
@@ -298,24 +317,18 @@ def learn_on_ray(settings: Training, scenario: Scenario, interface: Settings, fo
         return training.actor_network()
 
 
-def varied(text: str) -> dict[str, Any]:
-    """Quantities of a scenario to train in: "nodes=81,motion=turns"; faults are last: "nodes=81,faults=stuck+late"."""
-    others, faulty, faults = text.partition("faults=")
-    quantities = parse_overrides(filter(None, others.split(",")))
-    return quantities | ({"faults": faults} if faulty else {})
-
-
 def make_envs(settings: Training, scenario: Scenario, interface: Settings, rows: int) -> ConcatVectorEnv:
     """The rows, divided among the scenarios."""
-    scenarios = [scenario, *(scenario.override(**varied(text)) for text in settings.vary or ())]
+    scenarios = [scenario, *(scenario.override(**world_of(text)) for text in settings.vary or ())]
     shares = np.diff(np.arange(len(scenarios) + 1) * rows // len(scenarios))
     parts = []
-    for one, share in zip(scenarios, shares):
+    for place, (one, share) in enumerate(zip(scenarios, shares)):
         rows_of: Callable[..., ClusterVectorEnv] = ClusterVectorEnv
         if settings.steering:
             rows_of = partial(PricedVectorEnv, steering=settings.steering)
         envs = rows_of(int(share), one, autoreset_mode="Disabled", **asdict(interface))
-        parts.append(TrainingReward(envs, calibrated=settings.reward == "belief"))
+        told = PrivilegedVectorEnv(envs, place, len(scenarios)) if settings.privileged else envs
+        parts.append(TrainingReward(told, calibrated=settings.reward == "belief"))
     return ConcatVectorEnv(parts)
 
 
@@ -323,8 +336,9 @@ def check_settings(settings: Training) -> None:
     """Refuse now what would fail after the training."""
     for name in "steps rows rollout batch epochs torch_threads checkpoint_steps".split():
         check_quantity("Training", name, getattr(settings, name), at_least=1, whole=True)
+    check_quantity("Training", "points", settings.points, at_least=0, at_most=settings.steps, whole=True)
     check_quantity("Training", "batch", settings.batch, at_least=2)  # advantages are normalised by its sd
-    for name in ("gamma", "gae_lambda", "level"):
+    for name in ("gamma", "gae_lambda"):
         check_quantity("Training", name, getattr(settings, name), at_least=0, at_most=1)
     check_quantity("Training", "steering", settings.steering, at_least=0, at_most=100)
     check_quantity("Training", "learning_rate", settings.learning_rate, above=0, at_most=1)
@@ -337,14 +351,16 @@ def check_settings(settings: Training) -> None:
         if get_origin(hint) is Literal and getattr(settings, name) not in get_args(hint):
             allowed = ", ".join(get_args(hint))
             raise ValueError(f"Training.{name} = {getattr(settings, name)!r}: must be one of {allowed}")
+    if settings.privileged and settings.network != "entries":
+        raise ValueError("Training.privileged = True: must be False with the network 'flat', whose actor would see it")
     check_quantity("Training", "runners", settings.runners, at_least=0, whole=True)
+    if settings.engine == "ray" and settings.network != "entries":
+        raise ValueError(f"Training.network = {settings.network!r}: the engine ray trains only 'entries'")
     shares = 1 if settings.engine == "local" else max(1, settings.runners)
     others = len(settings.vary or ())
     if settings.rows // shares <= others:
         least = shares * (others + 1)
         raise ValueError(f"Training.rows = {settings.rows}: must be at least {least}, one a scenario and runner")
-    if settings.engine == "ray" and settings.network != "entries":
-        raise ValueError(f"Training.network = {settings.network!r}: the engine ray trains only 'entries'")
     if settings.address and settings.engine != "ray":
         raise ValueError(f"Training.address = {settings.address!r}: must be left out but with --engine ray")
     # Every seed that training may use lies below those of evaluations.
@@ -375,8 +391,6 @@ def make_model(settings: Training, envs) -> PPO:
         gae_lambda=settings.gae_lambda,
         ent_coef=settings.entropy,
         policy_kwargs=shape,
-        rollout_buffer_class=LevelledRollout,
-        rollout_buffer_kwargs={"level": settings.level},
         stats_window_size=1000,  # episodes: each has a lam of its own, so that fewer would tell little
         seed=settings.seed,
         device="cpu",
@@ -388,7 +402,8 @@ def architecture(settings: Training, envs) -> tuple:
     if settings.network == "flat":
         return "MlpPolicy", {"net_arch": {"pi": list(settings.units), "vf": list(settings.critic)}}
     (interface,) = envs.get_attr("interface", 0)
-    entries = entry_sizes(settings.action, interface.observation, settings.units, settings.critic)
+    seen = envs.observation_space.shape[0]
+    entries = entry_sizes(settings.action, interface.observation, seen, settings.units, settings.critic)
     return EntryPolicy, {"entries": entries}
 
 
@@ -404,12 +419,16 @@ def make_baselines(scenario: Scenario) -> dict[str, Policy]:
     return made
 
 
+def trade_offs(settings: Training, scenario: Scenario) -> list[float]:
+    """Where it is compared with others."""
+    return settings.lam if len(settings.lam) == 1 else list(scenario.lam_octaves)
+
+
 def compare(settings: Training, scenario: Scenario, policies: dict[str, Policy], made: dict) -> None:
     """Paired comparison with every baseline: table, CSV, JSON, picture, report."""
     folder = settings.folder
-    lams = settings.lam if len(settings.lam) == 1 else scenario.lam_octaves
-    if settings.steering:
-        lams = [0.0]  # the price was the network's own affair
+    # Where it is steered, the price is the network's own affair.
+    lams = [0.0] if settings.steering else trade_offs(settings, scenario)
     with progress_bar() as report:
         evaluation = evaluate(
             policies, scenario, lams, settings.episodes or 0, settings.evaluation_seed, keep=folder, progress=report

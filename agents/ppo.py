@@ -13,10 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gymnasium.spaces import Discrete
 
 from wsn_env.agents.base import ViewPolicy
-from wsn_env.envs.interface import Interface, Settings
+from wsn_env.envs.interface import Interface, Settings, logit_counts
 from wsn_env.envs.scarcity import MOST, energy_prices
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.policies import read_saved
@@ -101,9 +100,8 @@ class PPOPolicy(ViewPolicy):
                 raise ValueError(f"(action, observation) = {pair}: must be one of {INTERFACES}")
             # It may have been trained without what observations tell in this scenario.
             interfaces = [
-                Interface(self.scenario.override(scarce_energy=scarce, manoeuvre_q=manoeuvre_q), settings)
+                Interface(self.scenario.override(scarce_energy=scarce), settings)
                 for scarce in dict.fromkeys((self.scenario.scarce_energy, False))
-                for manoeuvre_q in dict.fromkeys((self.scenario.tracking.manoeuvre_q, None))
             ]
         except (TypeError, ValueError) as problem:
             raise ValueError(f"{path} is not a saved policy: {problem}") from None
@@ -112,7 +110,7 @@ class PPOPolicy(ViewPolicy):
         if digest != file_digest(weights):
             raise ValueError(f"{weights} is not the network that {path} was saved with: it is damaged, or another's")
         for interface in interfaces:
-            inputs, logits = interface.observation.space.shape[0], sum(_logit_counts(interface.action.space))
+            inputs, logits = interface.observation.space.shape[0], sum(logit_counts(interface.action.space))
             if network.fits(inputs, logits):
                 return interface, network
         raise ValueError(f"{path}: its network does not map {inputs} numbers to {logits}, as the environment wants")
@@ -123,15 +121,7 @@ class PPOPolicy(ViewPolicy):
             own = energy_prices(view, self._scarce, *self._price)
             view = view.at_lam(np.where(view.lam == 0.0, own, view.lam))
         interface, network = self._interface_and_network
-        logits = network.logits(interface.observation.encode(view))
-        ends = np.cumsum(_logit_counts(interface.action.space))[:-1]
-        best = np.stack([part.argmax(axis=1) for part in np.split(logits, ends, axis=1)], axis=1)
-        return interface.action.cluster(best.reshape(len(best), *interface.action.space.shape), view)
-
-
-def _logit_counts(space: Any) -> list[int]:
-    """How many logits each component of an action has."""
-    return [space.n] if isinstance(space, Discrete) else list(space.nvec)
+        return interface.most_probable(network.logits(interface.observation.encode(view)), view)
 
 
 @checked

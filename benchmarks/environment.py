@@ -20,10 +20,10 @@ from benchmarks.filters.agreement import STRICT, check_agreement
 from benchmarks.filters.book import BookFilter
 from benchmarks.naive import NaiveEnv
 from benchmarks.race import Claim, Options, Result, Table, Times, figure, interleave, main
+from benchmarks.vector import FIXED, ID
 from wsn_env.models.quantity import ScenarioError
 from wsn_env.scenario import Scenario
 
-ID = "wsn_env/PreDC-v0"
 ROWS = 64
 FURTHER = 3  # members beside the head
 MENU_ENTRY = 10 + FURTHER  # move the head to the nearest node
@@ -89,16 +89,16 @@ def table(times: Times) -> Table:
 
 def implementations() -> tuple[dict[str, tuple[Callable[[], object], int]], dict[str, str]]:
     """By name: a function, and how many steps of one field a call of it is. And by label: who cannot take part, why."""
-    envs = gym.make_vec(ID, num_envs=ROWS, vectorization_mode="vector_entry_point", threads=1)
+    envs = gym.make_vec(ID, num_envs=ROWS, vectorization_mode="vector_entry_point", threads=1, **FIXED)
     naive, book = NaiveEnv(), NaiveEnv(kind=BookFilter)
     kernel = enter(STRICT, Problem.draw("position", rows=ROWS))
     actions = np.full(ROWS, MENU_ENTRY)
     envs.reset(seed=0)
     naive.reset(seed=0)
     book.reset(seed=0)
-    field, skipped = {"single": (_stepper(gym.make(ID)), 1)}, {}
+    field, skipped = {"single": (_stepper(gym.make(ID, **FIXED)), 1)}, {}
     try:
-        field["fast"] = _stepper(gym.make(ID, fast=True)), 1
+        field["fast"] = _stepper(gym.make(ID, fast=True, **FIXED)), 1
     except (TypeError, ScenarioError):
         skipped[LABELS["fast"]] = "the environment takes no keyword fast"
     field |= {
@@ -144,7 +144,7 @@ def episode_differences(naive_episodes: int = 24, rows: int = 96, particles: int
 
 
 def _vector_episodes(rows: int, overrides: dict) -> dict[str, np.ndarray]:
-    envs = gym.make_vec(ID, num_envs=rows, vectorization_mode="vector_entry_point", threads=1, **overrides)
+    envs = gym.make_vec(ID, num_envs=rows, vectorization_mode="vector_entry_point", threads=1, **FIXED, **overrides)
     envs.reset(seed=0)
     energy = np.zeros(rows)
     truncated = np.zeros(rows, bool)

@@ -17,12 +17,12 @@ import numpy as np
 from rich.console import Console
 
 from benchmarks.race import Claim, Options, Result, Table, figure, main
+from benchmarks.vector import FIXED, ID
 from wsn_env.filters.kernels import make_scratch
 from wsn_env.models.state import Cluster, State
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.world import World
 
-ID = "wsn_env/PreDC-v0"
 SIZES = ((5000, 225), (500, 225), (5000, 10_000))  # particles, nodes
 ROWS, SHORT_ROWS = 256, 32
 STEPS = 5
@@ -105,7 +105,7 @@ def print_growth(particles: int, nodes: int, rows: int) -> None:
 
 
 def _world(particles: int, nodes: int) -> World:
-    return World(Scenario.named(ID, particles=particles, nodes=nodes), threads=1)
+    return World(Scenario.named(ID, particles=particles, nodes=nodes, **FIXED), threads=1)
 
 
 def _run(world: World, rows: int) -> State:

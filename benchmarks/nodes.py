@@ -16,7 +16,7 @@ from rich.console import Console
 
 from benchmarks.race import Claim, Options, Plot, Result, Table, Times, figure, interleave, main
 from benchmarks.stopwatch import Stopwatch
-from benchmarks.vector import ID, MENU_ENTRY
+from benchmarks.vector import FIXED, ID, MENU_ENTRY
 from wsn_env.compiled.kernels import lean_kernel
 from wsn_env.envs.interface import Settings
 from wsn_env.models.state import Network, network_at
@@ -60,7 +60,7 @@ def measure(options: Options, console: Console) -> Result:
 def scenario_of(nodes: int, growth: str) -> dict:
     """Overrides: `nodes` at the density of the scenario, or in its field."""
     side_m = Scenario.named(ID).field.side_m
-    return {"nodes": nodes, "side_m": side_m * math.sqrt(nodes / SMALLEST) if growth == DENSITY else side_m}
+    return FIXED | {"nodes": nodes, "side_m": side_m * math.sqrt(nodes / SMALLEST) if growth == DENSITY else side_m}
 
 
 def race(growth: str, sizes: tuple[int, ...], options: Options) -> Times:

@@ -18,7 +18,7 @@ from rich.console import Console
 
 from benchmarks.race import Claim, Options, Result, Table, Times, figure, interleave, main
 from benchmarks.stopwatch import Stopwatch
-from benchmarks.vector import ID, MENU_ENTRY, ROWS
+from benchmarks.vector import FIXED, ID, MENU_ENTRY, ROWS
 from wsn_env.envs.vector_env import ClusterVectorEnv
 from wsn_env.filters.particle import ParticleTracker
 from wsn_env.models.state import Belief, Network, Reports
@@ -167,7 +167,7 @@ class Episode:
 
     def _environment(self, rows: int, overrides: dict) -> ClusterVectorEnv:
         mode = dict(vectorization_mode="vector_entry_point", autoreset_mode="Disabled", threads=1)
-        return gym.make_vec(ID, num_envs=rows, **mode, **overrides).unwrapped
+        return gym.make_vec(ID, num_envs=rows, **mode, **(FIXED | overrides)).unwrapped
 
     def _step(self) -> None:
         self.envs.reset(seed=SEED)

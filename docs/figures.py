@@ -28,18 +28,7 @@ ROOT = HERE.parent
 OUT = ROOT / "out" / "figures"
 IMAGES = HERE / "images"
 RUNS = "out/figures/runs"
-SIZES = [f"{stem}{n}" for stem in ("nearest", "informed") for n in range(9)]
-SEEDS = {"PreDC-v0": 3, "Rssi-v0": 3, "Binary-v0": 1, "Anchors-v0": 1, "Underwater-v0": 1}  # trainings of each
-STEPS = {"Rssi-v0": 4_000_000}
-FRONT_LAMS = [0.3 * 10 ** (k / 12) for k in range(25)]  # 0.3 .. 30
-RULES = {  # beside adaptive, greedy and static_cluster
-    "PreDC-v0": [*SIZES[:9], "pre_dc", "centroid"],
-    "Rssi-v0": [*SIZES, "adaptive_informed", "pre_dc", "centroid"],
-    "Binary-v0": [*SIZES[9:], "adaptive_informed", "boundary", "random"],
-    "Anchors-v0": [*SIZES, "adaptive_informed"],
-    "Underwater-v0": [*SIZES, "adaptive_informed", "strongest_signal"],
-}
-
+SHIPPED = ("PreDC-v0", "Rssi-v0")  # whose policy is compared in many worlds
 FAULTS = [  # that a policy is trained with, beside those of none in fewer and in more nodes
     *("nodes=75", "nodes=450", "faults=failures,share=0.3", "faults=regional_failure,region_m=25"),
     *("faults=stuck,share=0.1", "faults=biased,bias_m=5", "faults=misplaced,position_sd_m=1"),
@@ -48,46 +37,18 @@ FAULTS = [  # that a policy is trained with, beside those of none in fewer and i
 ]
 
 
-def trainings(scenario: str) -> list[list[str]]:
-    """Of the policies that the pages compare."""
-    steps = str(STEPS.get(scenario, 3_000_000))
-    options = ["train.py", "--resume", "--scenario", scenario, "--steps", steps, "--episodes", "0"]
-    return [[*options, "--seed", str(k * 10**6), "--runs", f"{RUNS}/{k}"] for k in range(SEEDS[scenario])]
-
-
-def trained(scenario: str) -> list[str]:
-    """Where they are."""
-    return ["--policies", *(f"{RUNS}/{k}/{scenario}" for k in range(SEEDS[scenario]))]
-
-
-def compared(scenario: str, lams: Sequence[float] = ()) -> list[list[str]]:
-    """Those policies beside the rules, at these lams; none: the scenario's octaves."""
-    rules = ["--rules", *RULES[scenario], "adaptive", "greedy", "static_cluster"]
-    asked = ["-m", "studies.seeds", "--scenario", scenario, *trained(scenario), *rules, "--out", f"{{out}}/{scenario}"]
-    return [*trainings(scenario), [*asked, *(["--lam", *(f"{lam:.3g}" for lam in lams)] if lams else [])]]
-
-
 MAKERS: dict[str, list[list[str]]] = {  # arguments of Python, one command after the other; {out}: its folder
     "reproduce": [["-m", "wsn_env", "reproduce", "all", "--out", "{out}"]],
     "tables": [["-m", "studies.tables", "--out", "{out}"]],
     "bound": [["-m", "studies.bound", "--out", "{out}"]],
     "lifetime": [["-m", "studies.lifetime", "--out", "{out}"]],
+    "worlds": [["-m", "studies.worlds", "--scenario", name, "--out", "{out}"] for name in SHIPPED],
     "reliability": [["-m", "studies.reliability", "--out", "{out}"]],
     "planning": [
         ["-m", "studies.planning", "--scenario", name, "--out", "{out}/" + name] for name in ("PreDC-v0", "Rssi-v0")
     ],
 }
 TRAINING_MAKERS: dict[str, list[list[str]]] = {
-    "seeds": [command for name in SEEDS for command in compared(name)],
-    "fronts": [command for name in ("PreDC-v0", "Rssi-v0") for command in compared(name, FRONT_LAMS)],
-    "transfer": [
-        command
-        for name in ("PreDC-v0", "Rssi-v0")
-        for command in (
-            *trainings(name),
-            ["-m", "studies.transfer", "--scenario", name, *trained(name), "--out", "{out}"],
-        )
-    ],
     "faults": [
         *(
             [*"train.py --resume --scenario PreDC-v0 --episodes 0 --runs".split(), RUNS, *more, "--vary", *FAULTS]
@@ -95,8 +56,6 @@ TRAINING_MAKERS: dict[str, list[list[str]]] = {
         ),
         ["-m", "studies.faults", "--trained", f"{RUNS}/ppo_faults", f"{RUNS}/ppo_faults_error", "--out", "{out}"],
     ],
-    "ablations": [["-m", "studies.ablations", "--scenario", "Rssi-v0", "--out", "{out}"]],
-    "algorithms": [["-m", "studies.algorithms", "--scenario", "Rssi-v0", "--out", "{out}"]],
 }
 ALL = MAKERS | TRAINING_MAKERS
 

@@ -25,20 +25,20 @@ from wsn_env.cli import make_scenario
 from wsn_env.envs.merit import ORDERS
 from wsn_env.evaluation.comparison import evaluate
 from wsn_env.evaluation.progress import progress_bar
-from wsn_env.learning.defaults import default_level, default_order
 from wsn_env.scenario import Scenario
 
 USUAL = "usual"
-LEVELS = {0.0: "advantages: as they are", 1.0: "advantages: levelled"}
 DIFFERENT = {  # name: options of train.py
     USUAL: [],
     "reward: true error": ["--reward", "error"],
     "action: subset": ["--action", "subset"],
     "network: flat, 64 x 64": ["--network", "flat", "--units", "64", "64"],
-    "network: entries, 64 x 64": ["--units", "64", "64"],
+    "network: entries, 32 x 32": ["--units", "32", "32"],
+    "critic: sees what the actor sees": ["--no-privileged"],
+    "GAE lambda: 0.9": ["--gae-lambda", "0.9"],
+    "learning rate: 0.002": ["--learning-rate", "0.002"],
     "discount: 0.9": ["--gamma", "0.9"],
-    "fields: one density": ["--vary"],
-    **{name: ["--level", f"{level:g}"] for level, name in LEVELS.items()},
+    "worlds: its own alone": ["--vary"],
     **{f"order: {order}": ["--order", order] for order in ORDERS},
 }
 ONE_LAM = "lam: a policy for each"
@@ -110,8 +110,7 @@ def main() -> int:
 
 def variants(scenario: Scenario) -> list[str]:
     """What there is to try: all but what is usual under a name of its own."""
-    own = {f"order: {default_order(scenario)}", LEVELS[default_level(scenario)]}
-    return [name for name in (*DIFFERENT, ONE_LAM) if name not in own]
+    return [name for name in (*DIFFERENT, ONE_LAM) if name != f"order: {scenario.measurement.order}"]
 
 
 def train_variant(study: Study, job: Job) -> Path:

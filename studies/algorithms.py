@@ -22,7 +22,6 @@ from studies.report import save_table
 from wsn_env.cli import make_scenario
 from wsn_env.envs.vector_env import ClusterVectorEnv
 from wsn_env.evaluation.scoring import score
-from wsn_env.learning.defaults import default_order
 from wsn_env.learning.sb3 import SB3VecEnv
 from wsn_env.learning.training_reward import TrainingReward
 from wsn_env.scenario import Scenario
@@ -137,7 +136,7 @@ def train_and_play(study: Study, scenario: Scenario, name: str, seed: int) -> di
     if not path.exists():
         maker, action = ALGORITHMS[name]
         span = scenario.override(lam=scenario.lam_span)
-        interface = dict(action=action, observation="menu", order=default_order(scenario))
+        interface = dict(action=action, observation="menu", order=scenario.measurement.order)
         envs = ClusterVectorEnv(ROWS, span, reward="belief", autoreset_mode="Disabled", **interface)
         model = maker(SB3VecEnv(TrainingReward(envs, calibrated=True), stagger=True), seed=10**6 * seed, device="cpu")
         started = time.perf_counter()

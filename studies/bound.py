@@ -38,6 +38,7 @@ FREE = {  # tracks whose law the bound supposes, in fields that they seldom leav
     "Anchors-v0": "motion=free spread_m=25 speed_ms=0.5 acceleration_ms2=0.1 filter_q=0.1",
     "Underwater-v0": "motion=free spread_m=60 speed_ms=0.5 acceleration_ms2=0.01",
 }
+ONE_MOTION = "manoeuvre_q=none"  # the tracker's q is what suits the motion
 POLICIES = ("nearest3", "static_cluster")
 KERNEL = 0.1  # sds of the cloud by which copies of a particle are parted
 
@@ -313,7 +314,7 @@ def main(arguments: list[str] | None = None) -> int:
     rows = []
     for name in study.scenarios:
         for settings in (FREE[name] + " search=False", ""):
-            scenario = make_scenario(name, settings.split(), [])
+            scenario = make_scenario(name, [*settings.split(), ONE_MOTION], [])
             for policy in study.policies:
                 whole = not why_no_bound(scenario) and policy == study.policies[0]
                 asked = study if whole else replace(study, episodes=max(study.episodes // 4, 2))

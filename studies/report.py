@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Mapping
 from itertools import cycle
@@ -13,10 +12,11 @@ from scipy import stats
 
 from wsn_env.envs.rendering.colours import LINES
 from wsn_env.evaluation.files import replacing
+from wsn_env.learning.held_out import HELD_OUT
 from wsn_env.reports.markdown import markdown_table
+from wsn_env.reports.pages.learning_curves import STEPS, read_progress
 
-CURVE = "time/total_timesteps", "rollout/ep_rew_mean", "rollout/ep_len_mean"
-WORSE = 1.35  # the picture's lowest reward over its highest
+LOWEST = -15.0  # percent; what is worse still is not drawn
 
 Returns = dict[float, np.ndarray]  # lam: (episodes,)
 
@@ -62,20 +62,15 @@ def save_table(out: Path, scenario, lams, results: dict[str, list[Returns]], usu
 
 
 def learning_curve(folder: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Of a run of train.py: periods (N,), and the mean reward of the last 1,000 episodes (N,), all of them whole.
-
-    Rewards are those of the training: over the root of lam's cost, so that every lam counts alike.
-    """
-    rows = []
-    for path in sorted(folder.glob("progress-*/progress.csv"), key=lambda path: int(path.parent.name.split("-")[1])):
-        with open(path, encoding="utf-8") as file:
-            rows += [[row[name] for name in CURVE] for row in csv.DictReader(file)]
-    rows = [row for row in rows if all(row)]
-    if not rows:
-        raise ValueError(f"{folder}: no progress-*/progress.csv of a training")
-    periods, rewards, lengths = np.array(rows, float).T
-    whole = lengths == lengths.max()
-    return periods[whole], rewards[whole]
+    """Of a run of train.py: periods (N,), and its lead over the best rule on held-out episodes (N,), the mean over the
+    trade-offs [%]."""
+    progress = read_progress(folder)
+    names = [name for name in progress if name.startswith(HELD_OUT) and not name.endswith("_se")]
+    if not names:
+        raise ValueError(f"{folder}: no progress-*/progress.csv with a lead on held-out episodes")
+    lead = np.mean([progress[name] for name in names], axis=0)
+    told = np.isfinite(lead)
+    return progress[STEPS][told], lead[told]
 
 
 def draw_curves(folders: Mapping[str, list[Path]], title: str, path: Path) -> None:
@@ -94,13 +89,12 @@ def draw_curves(folders: Mapping[str, list[Path]], title: str, path: Path) -> No
     for (name, runs), colour, line in zip(folders.items(), cycle(LINES), cycle(["-"] * len(LINES) + ["--"] * 7)):
         curves = [learning_curve(folder) for folder in runs]
         periods = curves[0][0]
-        rewards = np.array([np.interp(periods, *curve) for curve in curves])
-        mean, half = np.array([over_seeds(column) for column in rewards.T]).T
+        leads = np.array([np.interp(periods, *curve) for curve in curves])
+        mean, half = np.array([over_seeds(column) for column in leads.T]).T
         axes.plot(periods / 1e6, mean, line, color=colour, linewidth=1.3, label=name)
         axes.fill_between(periods / 1e6, mean - half, mean + half, color=colour, alpha=0.15, linewidth=0)
-    axes.set(title=title, xlabel="periods [million]", ylabel="reward of an episode, in typical costs of a period")
-    low, high = axes.get_ylim()
-    axes.set_ylim(max(low, WORSE * high), high)
+    axes.set(title=title, xlabel="periods [million]", ylabel="return over the best rule, mean over lam [%]")
+    axes.set_ylim(bottom=max(axes.get_ylim()[0], LOWEST))
     axes.grid(alpha=0.3, linewidth=0.5)
     axes.legend(frameon=False, fontsize=9, loc="lower right")
     with replacing(path) as temporary:

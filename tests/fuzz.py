@@ -230,8 +230,6 @@ def draw_tracking(rng: Random, sections: dict[str, Any], keywords: dict[str, Any
         drawn |= {name: usual[name] for name in ROBUST}
     if measurement.lasting_errors:
         drawn |= dict(search=False, fusion="joint")
-    if (keywords | drawn).get("velocity_s", sections["tracking"].velocity_s) is not None:
-        drawn["manoeuvre_q"] = None
     if (keywords | drawn).get("gate_sds") is not None:
         drawn |= dict(fusion="joint", silent_information=False)
     if tracker.startswith("boundary"):

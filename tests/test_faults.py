@@ -12,6 +12,7 @@ from tests.worlds import assert_same, expected, keys_of
 from wsn_env import Cluster, Scenario, View, World, evaluate, make_policy
 from wsn_env.compiled import draws
 from wsn_env.filters.particle import ParticleTracker
+from wsn_env.learning.worlds import world_of
 from wsn_env.models import Fault, ScenarioError, quantity
 from wsn_env.models.fault.failures import Failures
 from wsn_env.models.fault.late import Late
@@ -443,11 +444,10 @@ def test_a_robust_filter_that_leaves_reports_out_takes_them_one_by_one():
 
 
 def test_training_takes_faults_last():
-    import train
 
-    assert train.varied("nodes=81,motion=turns") == {"nodes": 81, "motion": "turns"}
+    assert world_of("nodes=81,motion=turns") == {"nodes": 81, "motion": "turns"}
     faults = "stuck,share=0.1+late,probability=0.3"
-    assert train.varied(f"nodes=81,faults={faults}") == {"nodes": 81, "faults": faults}
+    assert world_of(f"nodes=81,faults={faults}") == {"nodes": 81, "faults": faults}
 
 
 def test_kept_rows_are_stale_when_a_fault_of_ones_own_changes(tmp_path):

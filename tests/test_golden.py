@@ -16,6 +16,7 @@ from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
 from wsn_env import Scenario, View, World, make_policy
 from wsn_env.compiled import draws
+from wsn_env.models.quantity import parse_overrides
 
 HERE = Path(__file__).parents[1]
 ROWS = 8
@@ -23,22 +24,30 @@ OUTCOMES = """error_m energy_mj energy_j spent_j members detections delivered dr
 posterior_rms_m believed_error_m alive target_m estimate_m""".split()
 VIEWED = "mean cov predicted_mean predicted_cov battery head member".split()
 GOLDEN = {
-    "PreDC-v0": "346e8f0ac23abb47b017db93f73fe25799429b82416717d45f73e7f2379d2f8f",
-    "Rssi-v0": "efe611ea1e981ddb3740e66680d5951fbef425bf1165ebf7d5584ffe4c326a45",
-    "Binary-v0": "80f3a96dbc277155f7cc1020a286c30887180e4b584591f16be7f323cfe0dc24",
-    "Anchors-v0": "0282a0b8404a233d8b2d7dd0ab40b791daf929f8c68c2bc7f1c8067958147b81",
-    "Underwater-v0": "1166cca6c6d41f1fa1409332cee6f8a4a257b533dab97eae42953360828aed70",
-    "Lifetime-v0": "aaebf64b934c7f7857e3b0d47eb4aa70ddbbcc3d05b8c92f43f1acae3ddbb535",
+    "PreDC-v0": "309ed52c7574dee96f63af6fbe5c9f02229fdde1335d62225ca84aed9d0cf64a",
+    "Rssi-v0": "d065e9d6428143dad590d86bb1c371c83ff27437d447e15254c82735e2d3f255",
+    "Binary-v0": "27ba17e4735d9d7058506bc87f0c9c6f7cd8353b3d85d49dfbd2f5a0ea7618a4",
+    "Anchors-v0": "a50d1cdf8321b3bf6a9e4b904c8731be0f632fe1e1b8529f06fa4ace06e687c4",
+    "Underwater-v0": "c4029527bb2459dbe64a5957299246491eaad910ff2fa0807884b7bd549095a1",
+    "Lifetime-v0": "7e8caedcfc2bbd8f6cb539135a4ee59a324a49f4b516535ae2c92b82b3bf9ffa",
+    "PreDC-v0 filter_q=0.05": "346e8f0ac23abb47b017db93f73fe25799429b82416717d45f73e7f2379d2f8f",
+    "Rssi-v0 filter_q=0.05": "efe611ea1e981ddb3740e66680d5951fbef425bf1165ebf7d5584ffe4c326a45",
+    "Binary-v0 filter_q=0.3": "80f3a96dbc277155f7cc1020a286c30887180e4b584591f16be7f323cfe0dc24",
+    "Anchors-v0 filter_q=1": "0282a0b8404a233d8b2d7dd0ab40b791daf929f8c68c2bc7f1c8067958147b81",
+    "Underwater-v0 filter_q=0.01": "1166cca6c6d41f1fa1409332cee6f8a4a257b533dab97eae42953360828aed70",
+    "Lifetime-v0 filter_q=0.2": "aaebf64b934c7f7857e3b0d47eb4aa70ddbbcc3d05b8c92f43f1acae3ddbb535",
     "Ble-v0": "f4624d31aa889db826b1b7473f1e807854dd3ae512853e9fcc1a12be8fe1218b",
 }
 
 
 def digest(name: str, rows: int = ROWS, threads: int = 1) -> str:
-    """SHA-256 of what the first ROWS rows brought and know in every period of 100, with three nearest members.
+    """SHA-256 of what the first ROWS rows brought and know in every period of 100, with three nearest members, in a
+    scenario, maybe with further settings.
 
     By name and value, so that another layout of the state is no other digest.
     """
-    scenario = Scenario.named(name)
+    scenario_id, *settings = name.split()
+    scenario = Scenario.named(scenario_id, **parse_overrides(settings))
     world, policy = World(scenario, threads=threads), make_policy("nearest3", scenario, hysteresis_m=8.0)
     state = world.reset([draws.key_of_seed(seed) for seed in range(rows)])
     sha = hashlib.sha256()

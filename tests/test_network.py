@@ -11,7 +11,7 @@ import torch
 
 from wsn_env import Scenario, make_policy
 from wsn_env.agents.ppo import PPOPolicy
-from wsn_env.learning.actor_critic import EntryActorCritic
+from wsn_env.learning.actor_critic import CHUNK, EntryActorCritic
 from wsn_env.learning.network import EntryNetwork, FlatNetwork, PolicyNetwork
 
 BELIEF, ENTRY = 7, 5
@@ -20,7 +20,7 @@ SCENARIO = Scenario.named("PreDC-v0")
 
 def actor(outputs: int, entries: int = 6) -> EntryActorCritic:
     torch.manual_seed(1)
-    made = EntryActorCritic(BELIEF, ENTRY, BELIEF + entries * ENTRY, outputs, actor=(9, 8), critic=(4, 4))
+    made = EntryActorCritic(BELIEF, ENTRY, entries, BELIEF + entries * ENTRY, outputs, actor=(9, 8), critic=(4, 4))
     for parameter in made.parameters():
         torch.nn.init.normal_(parameter)
     return made
@@ -40,6 +40,29 @@ def test_numpy_and_torch_agree(outputs):
     assert found.shape == wanted.shape == (33, 6 if outputs == 1 else 1 + 6 + 2 * 6)
     assert np.allclose(found, wanted, rtol=1e-4, atol=1e-4)
     assert (found == np.concatenate([twin.actor_network().logits(row[None]) for row in given])).all()
+
+
+@pytest.mark.parametrize("outputs", [1, 2])
+def test_the_gradient_by_hand_is_that_of_finite_differences(outputs):
+    """In more rows than one chunk; what only the critic sees, at the end, moves no logit."""
+    twin = actor(outputs).double()
+    rows = CHUNK + 3
+    given = torch.as_tensor(observations(6, rows)).double()
+    weights = torch.randn(rows, 6 if outputs == 1 else 19, dtype=torch.double)
+    (twin.forward_actor(given) * weights).sum().backward()
+    parts = [twin.belief, twin.entry, twin.hidden, twin.score]
+    for parameter in (one for part in parts for one in part.parameters()):
+        place = tuple(np.random.default_rng(3).integers(size) for size in parameter.shape)
+        totals = []
+        for step in (1e-6, -1e-6):
+            with torch.no_grad():
+                parameter[place] += step
+                totals.append(float((twin.forward_actor(given) * weights).sum()))
+                parameter[place] -= step
+        slope = (totals[0] - totals[1]) / 2e-6
+        assert float(parameter.grad[place]) == pytest.approx(slope, rel=1e-4, abs=1e-4)
+    more = torch.cat([given, torch.full((rows, 4), 9.0)], dim=1)
+    assert torch.equal(twin.forward_actor(more), twin.forward_actor(given))
 
 
 def test_an_entry_has_the_same_logit_wherever_it_stands_and_whatever_else_there_is():

@@ -31,10 +31,10 @@ def weighted_cloud(belief, row=0):
 
 
 class Filter:
-    """A tracker with `rows` clouds that all see the same reports but have keys of their own."""
+    """A tracker of one motion with `rows` clouds that all see the same reports but have keys of their own."""
 
     def __init__(self, rows=1, start=START, cov=P0, key=0, fast=False, **overrides):
-        self.scenario = Scenario.named("PreDC-v0", **overrides)
+        self.scenario = Scenario.named("PreDC-v0", manoeuvre_q=None, **overrides)
         self.tracker = ParticleTracker(self.scenario, fast=fast)
         particles, self.rows, self.period = self.tracker.particles, rows, 0
         self.keys = np.arange(key, key + rows).astype(np.uint64)

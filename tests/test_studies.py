@@ -7,14 +7,17 @@ import sys
 import numpy as np
 import pytest
 
-from studies import ablations, faults, lifetime, seeds, tables, transfer
+from studies import ablations, faults, lifetime, seeds, tables, worlds
 from studies.report import draw_curves, learning_curve, over_seeds, table
 from tests.figures import check_tables
 from wsn_env import Scenario
 from wsn_env.agents.ppo import PRETRAINED
+from wsn_env.learning.held_out import HELD_OUT
 from wsn_env.models.library import FAULTS
+from wsn_env.models.quantity import parse_overrides
 from wsn_env.scenario import named_scenarios
 
+RIVALS = ("nearest0", "nearest1")
 SMALL = "particles=50 nodes=40 side_m=50 crossing_m=20 periods=10".split()
 
 
@@ -44,25 +47,29 @@ def test_a_table_gives_means_over_trainings_and_what_differs():
     assert "-13.2 ± nan (-10.0 %)" in lines[3]
 
 
-def test_other_worlds_beside_the_best_size_there(tmp_path, monkeypatch, capsys):
-    shipped = str(PRETRAINED / "Rssi-v0")
-    worlds = [" ".join(SMALL), " ".join([*SMALL, "noise_db=6"])]
-    asked = ["--scenario", "Rssi-v0", "--policies", shipped, shipped, "--worlds", *worlds]
-    asked += ["--lam", "4", "--episodes", "12", "--out", str(tmp_path)]
-    monkeypatch.setattr(sys, "argv", ["transfer", *asked])
-    assert transfer.main() == 0
+def test_one_policy_in_many_worlds_beside_the_best_rule_of_each(tmp_path, monkeypatch, capsys):
+    """At lam = 0 nobody beats a rule that wakes nine; and a policy is level with itself under another name."""
+    small = [" ".join(SMALL), " ".join([*SMALL, "noise_db=6"])]
+    asked = ["--scenario", "Rssi-v0", "--policy", "nearest8", "--worlds", *small]
+    asked += ["--lam", "0", "40", "--episodes", "12", "--out", str(tmp_path)]
+    monkeypatch.setattr(sys, "argv", ["worlds", *asked])
+    monkeypatch.setattr(worlds, "RULES", RIVALS)
+    assert worlds.main() == 0
     text = (tmp_path / "Rssi-v0.md").read_text()
     assert text.strip() in capsys.readouterr().out
-    cell = r"\| (-[\d.]+) \([+-][\d.]+ \[[+-][\d.]+, [+-][\d.]+\] %\) \|$"
-    rows = [re.search(cell, line) for line in text.splitlines()[2:]]
-    assert len(rows) == 2 and float(rows[1][1]) < float(rows[0][1])  # twice the noise, a lower return
+    number = r"([+-][\d.]+)"
+    cells = re.findall(rf"(\*\*)?{number} \[{number}, {number}\](\*\*)? (nearest\d)", text)
+    assert len(cells) == 4 and {cell[-1] for cell in cells} <= set(RIVALS)
+    precise, frugal = [float(cell[1]) for cell in cells[::2]], [float(cell[1]) for cell in cells[1::2]]
+    assert min(precise) > 5 and max(frugal) < -100
+    assert "Of 4 cells: ahead in 2, behind in 2" in text and "better or less than 1 % worse in 2." in text
 
 
-@pytest.mark.parametrize("name", ["PreDC-v0", "Rssi-v0"])
+@pytest.mark.parametrize("name", ["PreDC-v0", "Rssi-v0", "Binary-v0", "Anchors-v0", "Underwater-v0"])
 def test_every_world_of_the_study_can_be_made(name):
     scenario = Scenario.named(name)
-    made = {transfer.make_scenario(name, text.split(), []) for text in transfer.worlds_of(scenario).values()}
-    assert len(made | {scenario}) == len(transfer.worlds_of(scenario)) + 1  # and differs from all others
+    made = {scenario.override(**parse_overrides(text.split())) for text in worlds.worlds_of(scenario).values()}
+    assert len(made) == len(worlds.worlds_of(scenario)) and scenario in made
 
 
 def test_variants_leave_out_the_usual_order_under_another_name():
@@ -71,20 +78,20 @@ def test_variants_leave_out_the_usual_order_under_another_name():
     assert ablations.variants(Scenario.named("Rssi-v0"))[0] == ablations.USUAL
 
 
-def progress(folder, begun: int, rows: list[tuple[int, float, int]]):
-    """What train.py logs: periods, mean reward and length of the last episodes."""
+def progress(folder, begun: int, rows: list[tuple[int, str, str]]):
+    """What train.py logs: periods, and the lead at two trade-offs, where it was taken."""
     path = folder / f"progress-{begun}" / "progress.csv"
     path.parent.mkdir(parents=True)
-    names = "rollout/ep_len_mean,time/total_timesteps,rollout/ep_rew_mean"
-    path.write_text("\n".join([names, *(f"{length},{periods},{reward}" for periods, reward, length in rows)]))
+    names = f"time/total_timesteps,{HELD_OUT}1,{HELD_OUT}1_se,{HELD_OUT}4"
+    path.write_text("\n".join([names, *(f"{periods},{one},,{four}" for periods, one, four in rows), ""]))
 
 
-def test_learning_curves_join_resumed_runs_and_leave_cut_episodes_out(tmp_path):
-    progress(tmp_path / "a", 0, [(10, -3.0, 40), (20, -90.0, 100), (30, -80.0, 100)])
-    progress(tmp_path / "a", 30, [(40, -75.0, 100)])
-    progress(tmp_path / "b", 0, [(20, -92.0, 100), (40, -77.0, 100)])
-    periods, rewards = learning_curve(tmp_path / "a")
-    assert periods.tolist() == [20, 30, 40] and rewards.tolist() == [-90, -80, -75]
+def test_learning_curves_join_resumed_runs_and_leave_out_where_none_was_taken(tmp_path):
+    progress(tmp_path / "a", 0, [(10, "", ""), (20, "-9", "-5"), (30, "-6", "-4")])
+    progress(tmp_path / "a", 30, [(40, "1", "3")])
+    progress(tmp_path / "b", 0, [(20, "-8", "-5"), (40, "0", "2")])
+    periods, lead = learning_curve(tmp_path / "a")
+    assert periods.tolist() == [20, 30, 40] and lead.tolist() == [-7, -5, 2]
     draw_curves({"usual": [tmp_path / "a", tmp_path / "b"]}, "two runs", tmp_path / "curves.png")
     assert (tmp_path / "curves.png").stat().st_size > 10_000
     with pytest.raises(ValueError, match="nowhere: no progress"):

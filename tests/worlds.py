@@ -138,7 +138,7 @@ def cloud(draw, measurement):
         outlier_share=draw(st.sampled_from([0.0, 0.0, 0.1])),
         node_sd_m=draw(st.sampled_from([0.0, 0.0, 2.0])),
     )
-    modes = dict(manoeuvre_q=draw(st.sampled_from([None, None, 0.7]))) if measurement != "beacon" else {}
+    modes = dict(manoeuvre_q=draw(st.sampled_from([None, None, 0.7])))
     return (
         (robust if MEASUREMENTS.kinds[measurement]().independent else {})
         | modes

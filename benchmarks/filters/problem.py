@@ -48,7 +48,7 @@ class Problem:
         resampling: bool = True,
     ) -> Problem:
         """A problem of the preset scenario with this measurement; q and noise are the scenario's unless given."""
-        changes = {} if q is None else {"filter_q": q}
+        changes = {"filter_q": Scenario.named(PRESETS[measurement]).filter_q if q is None else q}
         scenario = Scenario.named(
             PRESETS[measurement], particles=particles, resample_below=float(resampling), periods=PERIODS, **changes
         )

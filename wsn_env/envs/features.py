@@ -33,9 +33,9 @@ BELIEF_FEATURES = (
     "joint_detection",  # of the standing cluster
     "sparseness",  # distance of the ninth nearest candidate
 )
-MOTION_FEATURES = (  # behind them, where the filter finds out how the target moves
+MOTION_FEATURES = (  # behind them
     "surprise",  # log, halved
-    *(mode.name for mode in MODES),  # probabilities of its modes
+    *(mode.name for mode in MODES),  # probabilities of the filter's modes; in the long run, where it has none
 )
 CANDIDATE_FEATURES = (
     "ahead",  # in radii along and across the velocity, from the prediction
@@ -58,10 +58,8 @@ NINTH = 9
 
 
 def belief_features(scenario: Scenario) -> tuple[str, ...]:
-    """What observations tell of a row's belief; of its motion where the filter finds out, of its energy where that is
-    scarce."""
-    of_motion = MOTION_FEATURES if scenario.tracking.manoeuvre_q is not None else ()
-    return BELIEF_FEATURES + of_motion + (ENERGY_FEATURES if scenario.scarce_energy else ())
+    """What observations tell of a row's belief and of how the target moves; of its energy where that is scarce."""
+    return BELIEF_FEATURES + MOTION_FEATURES + (ENERGY_FEATURES if scenario.scarce_energy else ())
 
 
 class Heading(NamedTuple):
@@ -112,12 +110,11 @@ def describe_row(known: Any, b: int, outlook: Outlook, c: Any, f: np.ndarray) ->
 
     Returns: the direction of the predicted velocity, and how many features they are.
     """
-    heading, end = describe_belief(outlook, known.row[b], known.reports.count[b], c.radius_m, f[:G]), G
-    if c.switches:
-        f[end] = 0.5 * log(max(known.belief[b].surprise, LEAST_SURPRISE))
-        for k in range(COUNT):
-            f[end + 1 + k] = known.belief[b].mode_probabilities[k]
-        end += 1 + COUNT
+    belief = known.belief[b]
+    heading, end = describe_belief(outlook, known.row[b], known.reports.count[b], c.radius_m, f[:G]), G + 1 + COUNT
+    f[G] = 0.5 * log(max(belief.surprise, LEAST_SURPRISE))
+    for k in range(COUNT):
+        f[G + 1 + k] = belief.mode_probabilities[k]
     if c.scarce_energy:
         describe_energy(known, b, c, f[end : end + len(ENERGY_FEATURES)])
         end += len(ENERGY_FEATURES)

@@ -6,7 +6,7 @@ from inspect import signature
 from typing import Any
 
 import numpy as np
-from gymnasium.spaces import Box
+from gymnasium.spaces import Box, Discrete
 
 from wsn_env.envs.actions import Action, ActionName, make_action
 from wsn_env.envs.info import period_info
@@ -14,7 +14,9 @@ from wsn_env.envs.observations import Observation, ObservationName, make_observa
 from wsn_env.envs.rewards import RewardName, make_reward, reward_space
 from wsn_env.models.measurement.base import Order
 from wsn_env.models.quantity import UnknownQuantity, short, whole_number
+from wsn_env.models.state import Cluster
 from wsn_env.scenario import Scenario
+from wsn_env.simulation.view import View
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,17 @@ class Interface:
         self._counted = scenario.counted_m
         self._reference = scenario.reference_error_m, scenario.reference_energy_mj
 
+    def most_probable(self, logits: np.ndarray, view: View) -> Cluster:
+        """The clusters of the most probable actions.
+
+        Args:
+            logits: (B, n) of the action space's components, one after the other.
+        """
+        space = self.action.space
+        ends = np.cumsum(logit_counts(space))[:-1]
+        best = np.stack([part.argmax(axis=1) for part in np.split(logits, ends, axis=1)], axis=1)
+        return self.action.cluster(best.reshape(len(best), *space.shape), view)
+
     def reward_and_info(self, outcome: Any, lam: Any) -> tuple[Any, dict[str, Any]]:
         """A period's reward and info, of arrays (B, ...) or of one row's numbers."""
         reward = self._reward(outcome, lam)
@@ -86,3 +99,8 @@ class Interface:
         if self.reward_space is None:
             return reward + rest, rest
         return reward - np.stack([error, energy], axis=-1).astype(np.float32), rest
+
+
+def logit_counts(space: Any) -> list[int]:
+    """How many logits each component of an action has."""
+    return [space.n] if isinstance(space, Discrete) else list(space.nvec)

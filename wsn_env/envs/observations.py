@@ -225,12 +225,9 @@ class ViewObservation:
                 "member": spaces.Box(0, 1, (nodes,), np.int8),
                 "detected": spaces.Box(0, 1, (nodes,), np.int8),
                 "measured": box(-far, far, nodes, 2),
+                "surprise": box(0.0, far, 1),
+                "mode_probabilities": box(0.0, 1.0, COUNT),
             }
-            | (
-                {"surprise": box(0.0, far, 1), "mode_probabilities": box(0.0, 1.0, COUNT)}
-                if scenario.tracking.manoeuvre_q is not None
-                else {}
-            )
             | (self._of_receivers(box, nodes, far) if scenario.measurement.lasting_errors else {})
             | ({"bitmap": spaces.Box(0, 1, (nodes,), np.int8)} if scenario.measurement.reports_state else {})
         )

@@ -227,6 +227,11 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         return self._state.lam
 
     @property
+    def state(self) -> State:
+        """The whole world, the truth in it: for loggers and trainings, never for policies."""
+        return self._state
+
+    @property
     @one_thread
     def view(self) -> View:
         """What hand-written policies see now, all rows: `policy.act(envs.view)` is their choice."""

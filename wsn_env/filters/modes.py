@@ -55,11 +55,11 @@ def predict_by_mode(stream: Any, x: np.ndarray, modes: np.ndarray, t: Any) -> No
 def note_modes(modes: np.ndarray, weights: np.ndarray, probabilities: np.ndarray) -> None:
     """Fill in the probabilities (COUNT,) of the modes in which the target goes on, from the particles' weights.
 
-    Zeros where they have no modes.
+    Left as they are where particles have no modes.
     """
     n, least = len(modes), 1.0 / WHOLE
     scale = F(WHOLE // max(n, 1))  # as whole numbers weights add up in any order
-    for k in range(COUNT):
+    for k in range(COUNT if n > 0 else 0):
         mass = int32(0)
         for i in range(n):
             mass += int32(weights[i] * scale) * int32(modes[i] == k)
@@ -67,7 +67,7 @@ def note_modes(modes: np.ndarray, weights: np.ndarray, probabilities: np.ndarray
     total = 0.0
     for k in range(COUNT):
         total += probabilities[k]
-    for k in range(COUNT if total > 0.0 else 0):
+    for k in range(COUNT if n > 0 and total > 0.0 else 0):
         probabilities[k] /= total
 
 
@@ -87,7 +87,8 @@ def inherit_modes(modes: np.ndarray, ancestors: np.ndarray, scratch: np.ndarray)
 @lean_piece
 def allot_modes(modes: np.ndarray, probabilities: np.ndarray) -> None:
     """Of a target of which nothing is known: as if every particle's were drawn, in turn."""
-    probabilities[:] = 0.0
+    for k in range(COUNT if len(modes) > 0 else 0):
+        probabilities[k] = 0.0
     for i in range(len(modes)):
         modes[i] = DRAWN[(13 * i) % DRAWS]
         probabilities[modes[i]] += 1.0 / len(modes)

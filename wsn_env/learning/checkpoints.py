@@ -17,14 +17,16 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
+from wsn_env.learning.actor_critic import actor_network
 from wsn_env.learning.checkpoint_file import read_checkpoint, refuse_executable, unsuitable, write_checkpoint
-from wsn_env.learning.levelling import LevelledRollout
+from wsn_env.learning.held_out import HELD_OUT, HeldOut
 from wsn_env.learning.replayable import ReplayableRows
 
 CHECKPOINT = "checkpoint.safetensors"
 OLD_CHECKPOINT = "checkpoint.zip"
 GENERATORS = "generators.torch", "generators.numpy", "generators.numpy_place"
 WINDOWS = {"episodes.r": np.float32, "episodes.l": np.int32, "episodes.rms_m": np.float64}  # of the last episodes
+EARLIEST = 0.01  # share of the training after which the learning curve begins; its points are closer at first
 PENDING = "pending."  # what the last update has told, to be logged with the next rollout
 
 
@@ -113,14 +115,12 @@ def _restore(model: PPO, arrays: dict[str, np.ndarray], facts: dict[str, Any], s
 
 def _live_arrays(model: PPO) -> dict[str, np.ndarray]:
     """Everything that is restored in place, by name; none is a copy."""
-    rows, policy, buffer = _rows_of(model), model.policy, model.rollout_buffer
-    assert isinstance(buffer, LevelledRollout)
+    rows, policy = _rows_of(model), model.policy
     arrays = {f"policy.{name}": tensor.numpy() for name, tensor in policy.state_dict().items()}
     for i, weight in enumerate(policy.parameters()):
         moments = policy.optimizer.state.get(weight, {})
         arrays |= {f"optimizer.{i}.{name}": tensor.numpy() for name, tensor in moments.items()}
     arrays |= {f"errors.{i}": sums for i, sums in enumerate(rows.error_sums())}
-    arrays |= {"levelling": buffer.levelling.sums}
     return arrays | {"episodes": rows.episodes, "ages": rows.episode_lengths, "returns": rows.episode_returns}
 
 
@@ -155,6 +155,8 @@ class Watch(BaseCallback):
         checkpoint_steps: between two checkpoints.
         facts: what a training must share to go on from them.
         report: is called with steps done, all of them and how it goes.
+        held_out: gives a network's lead by trade-off; None: no learning curve.
+        points: of the learning curve, besides the last.
     """
 
     def __init__(
@@ -164,10 +166,13 @@ class Watch(BaseCallback):
         checkpoint_steps: int,
         facts: dict[str, dict[str, Any]],
         report: Callable[[int, int, str], Any],
+        held_out: HeldOut | None = None,
+        points: int = 1,
     ) -> None:
         super().__init__()
         self._path, self._steps, self._checkpoint_steps = folder / CHECKPOINT, steps, checkpoint_steps
-        self._facts, self._report = facts, report
+        self._facts, self._report, self._held_out = facts, report, held_out
+        self._told_at = steps * np.geomspace(EARLIEST, 1.0, points + 1)[:-1]
         self._taken: tuple[dict[str, np.ndarray], dict[str, Any]] | None = None
 
     def save(self) -> None:
@@ -186,13 +191,31 @@ class Watch(BaseCallback):
     def _on_training_start(self) -> None:
         self._saved = self.num_timesteps
 
+    def _evaluate(self) -> None:
+        """Log the lead over the best rule, with the rollout to come."""
+        assert self._held_out is not None and isinstance(self.model, PPO)
+        for lam, lead in self._held_out(actor_network(self.model)).items():
+            self.logger.record(f"{HELD_OUT}{lam:g}", lead.mean)
+            self.logger.record(f"{HELD_OUT}{lam:g}_se", lead.error)
+
     def _on_rollout_start(self) -> None:
+        model = self.model
+        assert isinstance(model, PPO)
+        due = (self._told_at > self.num_timesteps - model.n_steps * model.n_envs) & (
+            self._told_at <= self.num_timesteps
+        )
+        if self._held_out is not None and due.any():
+            self._evaluate()
         self._take()
         if self.num_timesteps - self._saved >= self._checkpoint_steps:
             self.save()
 
     def _on_training_end(self) -> None:
         self._take()
+        if self._held_out is not None:
+            self._evaluate()
+            self.logger.record("time/total_timesteps", self.num_timesteps)
+            self.logger.dump(self.num_timesteps)
 
     def _on_step(self) -> bool:
         return True

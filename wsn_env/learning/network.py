@@ -90,6 +90,10 @@ class PolicyNetwork:
             if not np.isfinite(self.arrays[name]).all():
                 raise ValueError(f"network array {name} has weights that are not finite")
 
+    def logits(self, observations: np.ndarray) -> np.ndarray:
+        """(B, logits) float32 from observations (B, observation) float32."""
+        raise NotImplementedError
+
     @checked
     def save(self, path: str | Path) -> None:
         """Write a safetensors file."""

@@ -12,14 +12,10 @@ import numpy as np
 import ray
 import torch
 from ray.rllib.algorithms.ppo import PPOConfig
-from ray.rllib.algorithms.ppo.torch.ppo_torch_learner import PPOTorchLearner
-from ray.rllib.connectors.connector_v2 import ConnectorV2
 from ray.rllib.core.columns import Columns
 from ray.rllib.core.rl_module.apis.value_function_api import ValueFunctionAPI
 from ray.rllib.core.rl_module.rl_module import RLModuleSpec
 from ray.rllib.core.rl_module.torch import TorchRLModule
-from ray.rllib.evaluation.postprocessing import Postprocessing
-from ray.rllib.utils.numpy import convert_to_numpy
 from ray.tune.registry import register_env
 
 from wsn_env.evaluation.progress import Progress
@@ -33,7 +29,6 @@ from wsn_env.learning.checkpoint_file import (
     unsuitable,
     write_checkpoint,
 )
-from wsn_env.learning.levelling import Levelling
 from wsn_env.learning.native_runner import NativeRunner
 from wsn_env.learning.network import EntryNetwork
 
@@ -56,30 +51,6 @@ class EntryModule(TorchRLModule, ValueFunctionAPI):
     def compute_values(self, batch: dict[str, Any], embeddings: Any | None = None) -> torch.Tensor:
         """(B,) of the critic."""
         return self.net.forward_critic(batch[Columns.OBS]).squeeze(-1)
-
-
-class LevelledLearner(PPOTorchLearner):
-    """PPO's, with advantages levelled by learner_config_dict["level"]."""
-
-    def build(self) -> None:
-        """As PPO's; then, after the advantages, level."""
-        super().build()
-        connector: Any = self._learner_connector  # made by then
-        connector.append(_Level(self.config.learner_config_dict["level"]))
-
-
-class _Level(ConnectorV2):
-    def __init__(self, level: float) -> None:
-        super().__init__()
-        self._levelling = Levelling(level)
-
-    def __call__(self, *, batch: dict[str, Any], **kwargs: Any) -> dict[str, Any]:
-        for own in batch.values():
-            advantages = own[Postprocessing.ADVANTAGES]
-            observations: Any = convert_to_numpy(own[Columns.OBS])
-            levelled = self._levelling(observations, np.asarray(convert_to_numpy(advantages)))
-            own[Postprocessing.ADVANTAGES] = advantages.new_tensor(levelled)
-        return batch
 
 
 class _OwnSeeds(gym.vector.VectorWrapper):
@@ -111,7 +82,6 @@ class RayTraining:
         rows: over all runners.
         runners: processes that step environments, a core each; 0: none but this one.
         rollout: periods of each row between two updates.
-        level: see Levelling.
         seed: of training.
         address: of a running cluster; None: one on this machine.
         training: more of RLlib's `training`: lr, gamma, ...
@@ -128,7 +98,6 @@ class RayTraining:
         rows: int,
         runners: int,
         rollout: int,
-        level: float,
         seed: int,
         address: str | None = None,
         **training: Any,
@@ -163,8 +132,6 @@ class RayTraining:
             )
             .fault_tolerance(restart_failed_env_runners=True)
             .training(
-                learner_class=LevelledLearner,
-                learner_config_dict={"level": level},
                 train_batch_size_per_learner=batch,
                 use_kl_loss=False,
                 vf_clip_param=float("inf"),

@@ -29,7 +29,7 @@ BELIEF = record(
         ("predicted_cov", "f8", (4, 4)),
         ("n_eff", "f8"),  # effective sample size before resampling; 0 for trackers without particles
         ("surprise", "f8"),  # how far reports have moved the estimate of late, over what was expected: about 1
-        ("mode_probabilities", "f8", COUNT),  # of the modes in which the target goes on; zeros for filters without
+        ("mode_probabilities", "f8", COUNT),  # of the modes in which the target goes on; for filters without LONG_RUN
     ]
 )
 

@@ -81,14 +81,13 @@ def _common_constants(scenario):
         "neighbourhood_m": neighbourhood_m(scenario),
     }
     plain = [(name, "f8") for name in numbers]
-    flags = [("equal_everywhere", "i8"), ("scarce_energy", "i8"), ("switches", "i8")]
+    flags = [("equal_everywhere", "i8"), ("scarce_energy", "i8")]
     # How wide a cell of the map of presence is along x and y, and the map; zeros where nobody asks for it.
     mapped = [("cell_m", "f8", 2), ("presence", "f8", (CELLS, CELLS))]
     made = _zeros([("radio", radio), *flags, *plain, *mapped])
     fill_constants(made["radio"], scenario.radio, scenario)
     made["equal_everywhere"] = scenario.measurement.equal_everywhere
     made["scarce_energy"] = scenario.scarce_energy
-    made["switches"] = scenario.tracking.manoeuvre_q is not None
     if scenario.scarce_energy:
         made["cell_m"], made["presence"] = np.array(scenario.field.room_m) / CELLS, presence(scenario)
     for name, value in numbers.items():
@@ -116,7 +115,7 @@ def _constants(scenario: Scenario) -> np.ndarray:
         radius_m=scenario.radius_m,
         error_cap_m=math.inf if scenario.error_cap_m is None else scenario.error_cap_m,
         q=scenario.filter_q,
-        switches=t.manoeuvre_q is not None,
+        switches=t.switches,
         manoeuvre_q=t.manoeuvre_q or 0.0,
         walks=walks,
         velocity_kept=1.0 if t.velocity_s is None else math.exp(-scenario.period_s / t.velocity_s),

@@ -27,7 +27,7 @@ TRACKERS = {  # name: where the class stands
     **dict.fromkeys(BOUNDARY_TRACKERS, "wsn_env.filters.boundary:BoundaryTracker"),
 }
 ROBUST = ("gate_sds", "outlier_share", "node_sd_m")  # what reckons with wrong reports
-PARTICLE_ONLY = ("silent_information", *ROBUST, "resampling", "redraw_on_handover", "velocity_s", "manoeuvre_q")
+PARTICLE_ONLY = ("silent_information", *ROBUST, "resampling", "redraw_on_handover", "velocity_s")
 STRENGTHS = ("grnn", "grnn_kf")  # trackers that read values of one number
 RANGES = ("trilateration", "nonlinear_ls")  # that turn a value into a distance
 
@@ -103,15 +103,17 @@ class Tracking(Section):
     )
     filter_q: float | None = quantity(
         None,
-        "sd of the filter's acceleration noise [m/s^2]; None: what suits the motion",
+        "sd of the filter's acceleration noise [m/s^2] throughout; None: manoeuvre_q's modes, and where there are none"
+        " what suits the motion",
         at_least=0,
         at_most=1000,
         optional=True,
     )
     manoeuvre_q: float | None = quantity(
-        None,
+        0.6,
         "the filter's target switches between modes of motion, from quiet to manoeuvring with acceleration noise of"
-        " this sd [m/s^2], so that the filter finds out how it moves; None: filter_q throughout (particle only)",
+        " this sd [m/s^2], so that the filter finds out how it moves; None, or filter_q or velocity_s given, or another"
+        " tracker: no modes (particle only)",
         above=0,
         at_most=1000,
         optional=True,
@@ -156,14 +158,16 @@ class Tracking(Section):
         """Whether the likelihood reckons with wrong reports."""
         return self.gate_sds is not None or self.outlier_share > 0 or self.node_sd_m > 0
 
+    @property
+    def switches(self) -> bool:
+        """Whether the filter finds out how the target moves: nothing else was said of its motion."""
+        told = self.filter_q is not None or self.velocity_s is not None
+        return self.tracker == "particle" and self.manoeuvre_q is not None and not told
+
     def check(self, scenario: Scenario) -> None:
         """Raise ScenarioError where it does not fit the rest of the scenario."""
         self._check_tracker(scenario.measurement)
         self._check_robust(scenario.measurement)
-        if self.manoeuvre_q is not None and self.velocity_s is not None:
-            raise ScenarioError(
-                f"Tracking.manoeuvre_q = {self.manoeuvre_q}: allowed is None with velocity_s, a motion of its own"
-            )
 
     def _check_tracker(self, measurement: Measurement) -> None:
         name = self.tracker

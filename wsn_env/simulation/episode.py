@@ -7,6 +7,7 @@ from wsn_env.compiled.arrays import record
 from wsn_env.compiled.elementary import exp, log
 from wsn_env.compiled.kernels import kernel, piece
 from wsn_env.models.field import lay_out, scatter
+from wsn_env.models.motion.modes import LONG_RUN
 from wsn_env.models.quantity import span
 from wsn_env.models.state import state_at
 from wsn_env.scenario import Scenario
@@ -101,6 +102,7 @@ def begin(
         state.reports.count[b] = 0
         state.reports.bitmap[b] = 0
         belief.surprise = 1.0
+        belief.mode_probabilities[:] = LONG_RUN
         belief.n_eff = state.belief.particles.shape[2]
         _first_belief(draws.stream(key, 0, draws.START), state.track[b, 0], s, belief.mean, belief.cov)
         for axis in range(4):  # where a first search takes the target to be

@@ -224,9 +224,7 @@ class View:
             "member": self.member.astype(np.int8),
             "detected": self.detected.astype(np.int8),
             "measured": self.measured.copy(),
-        }
-        if self.belief["mode_probabilities"].any():
-            arrays |= {name: self.belief[name].reshape(len(self.row), -1).copy() for name in MOVING}
+        } | {name: self.belief[name].reshape(len(self.row), -1).copy() for name in MOVING}
         if self.receivers.shape[1]:
             arrays |= {name: self.receivers[name].copy() for name in HEARING}
         return arrays | ({"bitmap": self.reports.bitmap.copy()} if self.reports.bitmap.shape[1] else {})
@@ -257,7 +255,7 @@ class View:
             known.row[name] = a[name].reshape(rows)
         for name in ("mean", "cov", "predicted_mean", "predicted_cov"):
             known.belief[name] = a[name]
-        for name in MOVING if MOVING[0] in a else ():
+        for name in MOVING:
             known.belief[name] = a[name].reshape(known.belief[name].shape)
         for name in HEARING if known.receivers.size else ():
             known.receivers[name] = a[name]

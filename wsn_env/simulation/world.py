@@ -61,7 +61,7 @@ class World:
         s = self.scenario
         nodes = s.field.nodes
         lengths = dict(rows=rows, nodes=nodes, instants=s.periods + 1, particles=self.tracker.particles)
-        if s.tracking.manoeuvre_q is not None:
+        if s.tracking.switches:
             lengths["switching"] = self.tracker.particles
         if self._faults.any:
             lengths["faulty"] = nodes

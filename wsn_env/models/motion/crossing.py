@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 TRIES = 100
 
 
+LEAST_FITTING_Q = 0.05  # m/s^2
+
+
 @dataclass(frozen=True)
 class Crossing(Motion):
     """Towards a uniform point of the inner field from another, in the horizon's time, but for noise (the default).
@@ -27,12 +30,16 @@ class Crossing(Motion):
     """
 
     allocates: ClassVar[bool] = False
-    fitting_q: ClassVar[float] = 0.05
     margin_m: float = quantity(10.0, "end points keep this distance from the border", at_least=0)
     crossing_m: float = quantity(40.0, "least distance between the end points", above=0)
     acceleration_ms2: float = quantity(
         0.025, "sd of the white acceleration on the track (q/2)", at_least=0, at_most=1000
     )
+
+    @property
+    def fitting_q(self) -> float:  # type: ignore[override]
+        """Twice the track's own, for what the straight line leaves out."""
+        return max(2.0 * self.acceleration_ms2, LEAST_FITTING_Q)
 
     @property
     def process_noise_ms2(self) -> float | None:

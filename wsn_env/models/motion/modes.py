@@ -41,6 +41,8 @@ ACCELERATION = np.array([mode.acceleration for mode in MODES], np.float32)
 SIN = np.sin([mode.turn for mode in MODES]).astype(np.float32)
 LEAVES = np.array([round(mode.leaves * STEPS / DRAWS) * DRAWS for mode in MODES], np.int32)  # of STEPS
 BEFORE = np.cumsum([0, *(mode.draws for mode in MODES[:-1])]).astype(np.int32)  # where in DRAWN each begins
+_LASTING = np.array([mode.draws / mode.leaves for mode in MODES])
+LONG_RUN = _LASTING / _LASTING.sum()  # each one's share of all periods
 DRAWN = np.array([number for number, mode in enumerate(MODES) for _ in range(mode.draws)], np.int8)
 
 

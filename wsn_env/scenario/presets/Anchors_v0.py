@@ -28,5 +28,5 @@ SCENARIO = Scenario(
     detection=Detection(radius_m=360.0, ceiling=1.0),
     measurement=Rssi(exponent=3.0),
     radio=Radio(receiver="target", report_bits=128, invitation_bits=0, retries=0),
-    tracking=Tracking(filter_q=1.0, start_sd_m=10.0, start_sd_ms=1.0, search=False),
+    tracking=Tracking(manoeuvre_q=3.0, start_sd_m=10.0, start_sd_ms=1.0, search=False),
 )

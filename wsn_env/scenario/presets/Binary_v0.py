@@ -26,5 +26,5 @@ SCENARIO = Scenario(
     detection=Detection(radius_m=60.0, softness=1e-6, ceiling=1.0),
     measurement=Binary(),
     radio=Radio(receiver="sink", report_bits=64, invitation_bits=0),
-    tracking=Tracking(filter_q=0.3, start_sd_m=10.0, start_sd_ms=1.0, rest_sd_ms=10.0),
+    tracking=Tracking(manoeuvre_q=1.2, start_sd_m=10.0, start_sd_ms=1.0, rest_sd_ms=10.0),
 )

@@ -32,6 +32,7 @@ SCENARIO = Scenario(
     tracking=Tracking(
         particles=1000,
         silent_information=True,
+        manoeuvre_q=0.03,
         resampling="spread",
         start_sd_m=20.0,
         start_sd_ms=1.0,
