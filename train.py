@@ -336,7 +336,7 @@ def check_settings(settings: Training) -> None:
     """Refuse now what would fail after the training."""
     for name in "steps rows rollout batch epochs torch_threads checkpoint_steps".split():
         check_quantity("Training", name, getattr(settings, name), at_least=1, whole=True)
-    check_quantity("Training", "points", settings.points, at_least=0, at_most=settings.steps, whole=True)
+    check_quantity("Training", "points", settings.points, at_least=0, at_most=10_000, whole=True)
     check_quantity("Training", "batch", settings.batch, at_least=2)  # advantages are normalised by its sd
     for name in ("gamma", "gae_lambda"):
         check_quantity("Training", name, getattr(settings, name), at_least=0, at_most=1)

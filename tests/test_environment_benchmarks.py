@@ -69,7 +69,7 @@ def test_nodes(monkeypatch):
 
 def test_the_same_density():
     wide = nodes.scenario_of(900, nodes.DENSITY)
-    assert wide == {"nodes": 900, "side_m": 200.0}
+    assert wide == nodes.FIXED | {"nodes": 900, "side_m": 200.0}
     assert nodes.scenario_of(900, nodes.SIDE)["side_m"] == 100.0
 
 

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[1]
 @pytest.mark.parametrize("name", ["sb3_ppo", "cleanrl_ppo", "mo_gymnasium_ppo"])
 def test_it_learns_something(name):
     """Exit status 0 says that the 95 % interval of what it is ahead of random actions lies above 0."""
-    command = [sys.executable, EXAMPLES[name], "--steps", "4000"]
+    command = [sys.executable, EXAMPLES[name], "--steps", "8000"]
     done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, timeout=180)
     assert done.returncode == 0, done.stdout + done.stderr
     assert CLOSING.match(done.stdout.splitlines()[-1])

@@ -14,7 +14,7 @@ from wsn_env.agents.budget import PRICES, STEERINGS, Budget, find_price
 from wsn_env.agents.tuned import tuned
 from wsn_env.compiled import draws
 from wsn_env.envs.actions import GROUP, MENU_ENTRIES, make_action
-from wsn_env.envs.features import BELIEF_FEATURES
+from wsn_env.envs.features import BELIEF_FEATURES, MOTION_FEATURES
 from wsn_env.envs.observations import make_observation
 from wsn_env.envs.prospects import ENTRY_FEATURES
 from wsn_env.envs.scarcity import ENERGY_FEATURES, FAR_AHEAD, LEAST_SUPPLY
@@ -28,7 +28,7 @@ from wsn_env.scenario.tracks import CELLS, STATES, Tracks, neighbourhood_m, pres
 from wsn_env.simulation.lifetime import METRICS, lifetimes
 
 SMALL = dict(nodes=30, side_m=50.0, particles=60, periods=120)
-POOR = Scenario.named("Lifetime-v0", **SMALL, battery_j=(1e-5, 4e-4))
+POOR = Scenario.named("Lifetime-v0", **SMALL, filter_q=0.2, battery_j=(1e-5, 4e-4))
 
 
 def test_batteries_are_drawn_for_each_episode_log_uniformly_and_by_its_key():
@@ -147,7 +147,7 @@ def halfway():
 
 
 def test_what_observations_tell_of_energy_is_what_plain_numpy_finds(halfway):
-    view, first = halfway, len(BELIEF_FEATURES)
+    view, first = halfway, len(BELIEF_FEATURES + MOTION_FEATURES)
     for name in ("menu", "candidates"):
         told = make_observation(name, POOR, "nearest", 12).encode(view)[:, first : first + len(ENERGY_FEATURES)]
         told = dict(zip(ENERGY_FEATURES, told.T))
@@ -207,7 +207,7 @@ def test_where_energy_is_not_scarce_observations_are_as_ever():
     scenario = POOR.override(scarce_energy=False)
     view = View.of(World(scenario).reset([draws.key_of_seed(3)]))
     more, less = (make_observation("menu", each, "nearest", 12).encode(view)[0] for each in (POOR, scenario))
-    belief = len(BELIEF_FEATURES)
+    belief = len(BELIEF_FEATURES + MOTION_FEATURES)
     assert (more[:belief] == less[:belief]).all()
     entries = more[belief + len(ENERGY_FEATURES) :].reshape(MENU_ENTRIES, -1)[:, : len(ENTRY_FEATURES)]
     assert (entries == less[belief:].reshape(MENU_ENTRIES, -1)).all()

@@ -54,7 +54,7 @@ def test_the_particle_filter_tracks_by_bearings_near_the_reference(bearing):
 def test_a_sharper_sensor_tracks_better(bearing):
     rms = []
     for sd_deg in (1, 20):
-        scenario = Scenario.named("PreDC-v0", measurement=bearing(sd_deg=sd_deg), **SMALL)
+        scenario = Scenario.named("PreDC-v0", measurement=bearing(sd_deg=sd_deg), filter_q=0.05, **SMALL)
         rms.append(np.mean([row["rms_m"] for row in evaluate(["all"], scenario, episodes=4, threads=1).rows]))
     assert rms[0] < 0.5 * rms[1]
 

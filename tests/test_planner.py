@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from studies.planning import main
-from tests.test_policies import SCENARIO, chosen, walked
+from tests import test_policies
+from tests.test_policies import chosen, walked
 from tests.worlds import assert_same, expected, expected_gain
 from wsn_env import Scenario, View, World, evaluate
 from wsn_env.agents.imagined import GaussianTracker, draw_worlds, imagined_world, place_nodes, take_rows
@@ -17,6 +18,9 @@ from wsn_env.scenario import named_scenarios
 
 RSSI = Scenario.named("Rssi-v0", particles=200)
 QUICK = dict(horizon=3, worlds=12)
+
+
+SCENARIO = test_policies.SCENARIO.override(filter_q=0.05)
 
 
 def some_rows(scenario=SCENARIO, rows=4, lam=4.0):

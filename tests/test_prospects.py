@@ -7,7 +7,7 @@ import pytest
 from wsn_env import Scenario, View, World
 from wsn_env.compiled import draws
 from wsn_env.envs.actions import MENU_ENTRIES
-from wsn_env.envs.features import BELIEF_FEATURES
+from wsn_env.envs.features import BELIEF_FEATURES, MOTION_FEATURES
 from wsn_env.envs.interface import Interface, Settings
 from wsn_env.envs.prospects import ENTRY_FEATURES
 from wsn_env.models.measurement.base import PositionBelief, chance, node_at
@@ -20,7 +20,9 @@ ENTRIES = (0, 1, 3, 6, 10, 12, 15, 19, 22)  # as it is; head kept, moved to the 
 def prospects(scenario, view, order="nearest"):
     """(B, 28) of each feature by name."""
     observation = Interface(scenario, Settings(observation="menu", order=order)).observation
-    entries = observation.encode(view)[:, len(BELIEF_FEATURES) :].reshape(len(view.row), MENU_ENTRIES, -1)
+    entries = observation.encode(view)[:, len(BELIEF_FEATURES + MOTION_FEATURES) :].reshape(
+        len(view.row), MENU_ENTRIES, -1
+    )
     return dict(zip(ENTRY_FEATURES, np.moveaxis(entries, 2, 0)))
 
 

@@ -19,7 +19,7 @@ from wsn_env.envs.rendering.plan import WORDS_FROM, legend, plan_of
 GOLDEN = Path(__file__).parent / "golden" / "frame.png"
 
 
-CLEAR = {"Lifetime-v0": 4}  # seeds of pictures in which nothing covers what is looked for; else 1
+CLEAR = {"Lifetime-v0": 4, "PreDC-v0": 3}  # seeds of pictures in which nothing covers what is looked for; else 1
 
 
 def played(actions, seed=0, scenario="PreDC-v0", **keywords):
@@ -44,7 +44,7 @@ def count(picture, colour):
 
 def test_frame_is_the_golden_one():
     """Tolerance: half a level in the mean, one pixel in a thousand quite another: fonts and rounding, not shapes."""
-    picture = played([13, 13, 14, 15, 13, 0, 0, 14])[0].render()
+    picture = played([13, 13, 14, 15, 13, 0, 0, 14], filter_q=0.05)[0].render()
     if not GOLDEN.exists():
         Image.fromarray(picture).save(GOLDEN)
         pytest.fail(f"{GOLDEN} was missing: look at the new one")

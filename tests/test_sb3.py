@@ -178,7 +178,7 @@ def remember(result, infos):
 
 def test_calibrated_rewards_cost_what_the_true_errors_do_among_sharp_and_wide_beliefs():
     """Once thousands of metres of errors are known."""
-    settings = dict(scenario="Rssi-v0", nodes=81, particles=500, lam=0.0, autoreset_mode="Disabled")
+    settings = dict(scenario="Rssi-v0", nodes=81, particles=500, lam=0.0, filter_q=0.05, autoreset_mode="Disabled")
     envs = [ClusterVectorEnv(64, reward="belief", **settings) for _ in range(2)]
     believed, calibrated = SB3VecEnv(envs[0]), SB3VecEnv(TrainingReward(envs[1], calibrated=True))
     rng, infos = np.random.default_rng(0), {}

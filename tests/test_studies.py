@@ -51,9 +51,10 @@ def test_one_policy_in_many_worlds_beside_the_best_rule_of_each(tmp_path, monkey
     """At lam = 0 nobody beats a rule that wakes nine; and a policy is level with itself under another name."""
     small = [" ".join(SMALL), " ".join([*SMALL, "noise_db=6"])]
     asked = ["--scenario", "Rssi-v0", "--policy", "nearest8", "--worlds", *small]
-    asked += ["--lam", "0", "40", "--episodes", "12", "--out", str(tmp_path)]
+    asked += ["--lam", "0", "40", "--episodes", "200", "--out", str(tmp_path)]
     monkeypatch.setattr(sys, "argv", ["worlds", *asked])
     monkeypatch.setattr(worlds, "RULES", RIVALS)
+    monkeypatch.delenv(worlds.RECORDED, raising=False)
     assert worlds.main() == 0
     text = (tmp_path / "Rssi-v0.md").read_text()
     assert text.strip() in capsys.readouterr().out

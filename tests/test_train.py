@@ -515,9 +515,9 @@ def test_saved_policies_are_checked(run, tmp_path):
     scenario = Scenario.named("PreDC-v0", **parse_overrides(SET))
     network = PolicyNetwork.load(run / "policy.safetensors")
     with pytest.raises(ValueError, match="finite"):
-        EntryNetwork(network.arrays | {"belief.bias": np.full(32, np.nan)})
+        EntryNetwork(network.arrays | {"belief.bias": np.full(64, np.nan)})
     with pytest.raises(ValueError, match="does not fit"):
-        EntryNetwork(network.arrays | {"belief.bias": np.zeros(31)})
+        EntryNetwork(network.arrays | {"belief.bias": np.zeros(63)})
     for kind in ("pre_dc", 5, "nothing"):
         (tmp_path / "policy.json").write_text(json.dumps({"kind": kind}))
         with pytest.raises(ValueError, match="not a saved policy"):
