@@ -147,11 +147,10 @@ class Training:
     checkpoint_steps: int = 500_000
     """Periods between checkpoints."""
 
+    # comparison
     points: int = 12
     """Points of the learning curve, closer at first: its lead over the best rule on held-out episodes, at each of the
     scenario's trade-offs; 0: none. None either where energy is scarce: its price is found at the end."""
-
-    # comparison
     episodes: int | None = None
     """Held-out episodes of the paired comparison; 0: none. Left out: 1000, and fewer where they are long."""
     evaluation_seed: int = 0
@@ -196,8 +195,8 @@ def train(settings: Training) -> None:
     rules = make_baselines(scenario) if settings.episodes else {}
     torch.set_num_threads(settings.torch_threads)
     observation: ObservationName = "menu" if settings.action == "menu" else "candidates"
-    order = settings.order or scenario.measurement.order
-    interface = Settings(settings.action, observation, settings.reward, order)
+    assert settings.order is not None  # complete_settings has filled it in
+    interface = Settings(settings.action, observation, settings.reward, settings.order)
     folder, values = settings.folder, settings_as_json(settings)
     open_folder(folder, values, settings.resume)
     learn = learn_on_ray if settings.engine == "ray" else learn_locally

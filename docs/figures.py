@@ -28,6 +28,8 @@ ROOT = HERE.parent
 OUT = ROOT / "out" / "figures"
 IMAGES = HERE / "images"
 RUNS = "out/figures/runs"
+TRACKS = sorted(map(str, (ROOT / "out" / "tracks").glob("*.csv")))  # as examples/ble_tracks.py makes them
+RECORDED = ["--tracks", *TRACKS] if TRACKS else []  # without them tables lack the row of recorded motion
 SHIPPED = ("PreDC-v0", "Rssi-v0")  # whose policy is compared in many worlds
 FAULTS = [  # that a policy is trained with, beside those of none in fewer and in more nodes
     *("nodes=75", "nodes=450", "faults=failures,share=0.3", "faults=regional_failure,region_m=25"),
@@ -42,7 +44,7 @@ MAKERS: dict[str, list[list[str]]] = {  # arguments of Python, one command after
     "tables": [["-m", "studies.tables", "--out", "{out}"]],
     "bound": [["-m", "studies.bound", "--out", "{out}"]],
     "lifetime": [["-m", "studies.lifetime", "--out", "{out}"]],
-    "worlds": [["-m", "studies.worlds", "--scenario", name, "--out", "{out}"] for name in SHIPPED],
+    "worlds": [["-m", "studies.worlds", "--scenario", name, *RECORDED, "--out", "{out}"] for name in SHIPPED],
     "reliability": [["-m", "studies.reliability", "--out", "{out}"]],
     "planning": [
         ["-m", "studies.planning", "--scenario", name, "--out", "{out}/" + name] for name in ("PreDC-v0", "Rssi-v0")

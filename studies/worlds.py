@@ -1,20 +1,18 @@
 """One trained policy in many worlds, beside the rule that is best in each: tables of docs/learning.md.
 
-    python -m studies.worlds --scenario Rssi-v0 --dataset DATASET --out out/worlds
+    python -m studies.worlds --scenario Rssi-v0 --tracks tracks/*.csv --out out/worlds
 
-Other fields, motions, noises and losses. In each world and at each lam the best of all rules is chosen in hindsight, by
+Other fields, motions, noises and losses. In each world and at each lam the best of 21 rules is chosen in hindsight, by
 the very episodes that it is compared on.
 """
 
 from __future__ import annotations
 
-import os
 import sys
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
 import tyro
 
 from wsn_env.cli import make_scenario
@@ -24,15 +22,13 @@ from wsn_env.evaluation.intervals import Summary
 from wsn_env.evaluation.kept_blocks import remove_kept_blocks
 from wsn_env.evaluation.policies import make_policy
 from wsn_env.evaluation.progress import progress_bar
+from wsn_env.learning.worlds import nodes_of, noises
 from wsn_env.models.quantity import parse_overrides
-from wsn_env.models.recordings.dataset import read_dataset
 from wsn_env.reports.markdown import markdown_table
 from wsn_env.scenario import Scenario
 
 SIZES = [f"{order}{size}" for order in ("nearest", "informed") for size in range(9)]
 RULES = ["greedy", "adaptive", "adaptive_informed", *SIZES]
-RECORDED = "WSN_BLE_DIR"
-LEAST_GAP_S = 0.05  # packets of several receivers come at one time
 NEAR = -1.0  # percent; a policy that is less than this behind is told as near
 
 
@@ -46,8 +42,8 @@ class Worlds:
     """A policy's name, or the path of a policy.json."""
     worlds: list[str] = field(default_factory=list)
     """Each some quantities, as "name=value name=value"; left out: the study's own."""
-    dataset: Path | None = field(default_factory=lambda: Path(folder) if (folder := os.environ.get(RECORDED)) else None)
-    """Folder of recorded walks (Danis et al., 2022), whose motion is one world more; left out: that of WSN_BLE_DIR."""
+    tracks: list[Path] = field(default_factory=list)
+    """CSV files of recorded motion, one world more (examples/ble_tracks.py makes such)."""
     lam: list[float] = field(default_factory=list)
     """Trade-offs [m/mJ]; left out: the scenario's octaves."""
     particles: int = 1000
@@ -78,9 +74,8 @@ def main() -> int:
     usual = usual.override(particles=min(asked.particles, usual.tracking.particles))
     worlds = {text: text for text in asked.worlds} or worlds_of(usual)
     scenarios = {what: usual.override(**parse_overrides(text.split())) for what, text in worlds.items()}
-    if asked.dataset is not None and usual.tracking.switches:
-        tracks = write_tracks(asked.dataset, asked.out)
-        scenarios["motion of six recorded walks"] = usual.override(motion="recorded", tracks=tracks)
+    if asked.tracks:
+        scenarios["recorded motion"] = usual.override(motion="recorded", tracks=tuple(map(str, asked.tracks)))
     lams = asked.lam or usual.lam_octaves
     table: dict[str, list[Cell]] = {}
     folders = [asked.out / f"{asked.scenario}-{i}" for i in range(len(scenarios))]
@@ -108,36 +103,18 @@ def worlds_of(scenario: Scenario) -> dict[str, str]:
     """{what it is: quantities}."""
     worlds = {"as it is": ""}
     if scenario.field.positions is None:
-        root = 0.6 if scenario.field.layout == "grid" else None
         for what, share in (("sparse", 0.36), ("dense", 40 / 9)):
-            nodes = scenario.field.nodes * share
-            worlds[f"{what}: {{}} nodes"] = f"nodes={round(nodes**0.5) ** 2 if root else round(nodes)}"
-        worlds = {what.format(settings.partition("=")[2]): settings for what, settings in worlds.items()}
+            nodes = nodes_of(scenario, share)
+            worlds[f"{what}: {nodes} nodes"] = f"nodes={nodes}"
     if scenario.tracking.switches:
         worlds |= {
             "turns of up to 90°": "motion=turns",
             "a circle": "motion=circle",
             "random waypoints": "motion=waypoint",
         }
-    for item in fields(scenario.measurement):
-        if item.name in ("noise_m", "noise_db"):
-            sd, unit = getattr(scenario.measurement, item.name), item.name.partition("_")[2].replace("db", "dB")
-            for what, factor in (("half", 0.5), ("twice", 2.0)):
-                worlds[f"{what} the noise, {factor * sd:g} {unit}"] = f"{item.name}={factor * sd:g}"
+    for what, factor in (("half", 0.5), ("twice", 2.0)):
+        worlds |= {f"{what} the noise, {noise}": noise for noise in noises(scenario, factor)}
     return worlds | {"three packets in ten are lost": "packet_success=0.7"}
-
-
-def write_tracks(dataset: Path, out: Path) -> tuple[str, ...]:
-    """The motion of recorded walks as CSV files; returns their paths."""
-    out.mkdir(parents=True, exist_ok=True)
-    paths = []
-    for walk in read_dataset(dataset):
-        path, order = out / f"{walk.name}.csv", np.argsort(walk.time_s, kind="stable")
-        rows = np.column_stack([walk.time_s, walk.position_m[:, :2]])[order]
-        rows = rows[np.append(True, np.diff(rows[:, 0]) > LEAST_GAP_S)]
-        np.savetxt(path, rows, delimiter=",", header="t,x,y", comments="", fmt="%.6g")
-        paths.append(str(path))
-    return tuple(paths)
 
 
 def lead_of(policy: str, evaluation: Evaluation, lam: float) -> Cell:

@@ -18,8 +18,6 @@ from wsn_env.scenario import named_scenarios
 
 RSSI = Scenario.named("Rssi-v0", particles=200)
 QUICK = dict(horizon=3, worlds=12)
-
-
 SCENARIO = test_policies.SCENARIO.override(filter_q=0.05)
 
 

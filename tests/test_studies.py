@@ -54,7 +54,6 @@ def test_one_policy_in_many_worlds_beside_the_best_rule_of_each(tmp_path, monkey
     asked += ["--lam", "0", "40", "--episodes", "200", "--out", str(tmp_path)]
     monkeypatch.setattr(sys, "argv", ["worlds", *asked])
     monkeypatch.setattr(worlds, "RULES", RIVALS)
-    monkeypatch.delenv(worlds.RECORDED, raising=False)
     assert worlds.main() == 0
     text = (tmp_path / "Rssi-v0.md").read_text()
     assert text.strip() in capsys.readouterr().out

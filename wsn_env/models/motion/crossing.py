@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from wsn_env.scenario import Scenario
 
 TRIES = 100
-
-
 LEAST_FITTING_Q = 0.05  # m/s^2
 
 

@@ -25,9 +25,8 @@ READING: dict[str, Any] = dict(
 PARTICLES = (10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000)
 MOTIONS = ("straight", "sine", "circle", "turns")
 FILTERS: dict[str, dict[str, Any]] = {  # of Figs. 5-6: what each changes in the reading
-    "fitting": dict(
-        filter_q=None, manoeuvre_q=None, search=True
-    ),  # the q that fits the motion, and a search for lost tracks
+    # The q that fits the motion, and a search for lost tracks.
+    "fitting": dict(filter_q=None, manoeuvre_q=None, search=True),
     "curves": dict(filter_q=0.2, search=True),  # the q that fits the curved ones: on the straight one
     "as read": {},
 }
