@@ -38,6 +38,7 @@ from wsn_env.evaluation.versions import versions
 from wsn_env.learning.actor_critic import EntryPolicy, actor_network, entry_sizes
 from wsn_env.learning.checkpoints import Watch, check_finite, load_checkpoint
 from wsn_env.learning.concat_vector_env import ConcatVectorEnv
+from wsn_env.learning.even_worlds import EvenWorldsBuffer
 from wsn_env.learning.held_out import HeldOut
 from wsn_env.learning.network import PolicyNetwork
 from wsn_env.learning.priced_vector_env import PricedVectorEnv
@@ -127,6 +128,9 @@ class Training:
     """Discount per period."""
     gae_lambda: float = 0.7
     """Of the generalised advantage estimate."""
+    even_worlds: bool = True
+    """Bring the advantages in each scenario to one size, lest those decide in which costs vary most. The engine ray
+    leaves them as they are."""
     entropy: float = 5e-4
     """Weight of the entropy bonus."""
     network: Literal["entries", "flat"] = "entries"
@@ -319,16 +323,21 @@ def learn_on_ray(settings: Training, scenario: Scenario, interface: Settings, fo
 def make_envs(settings: Training, scenario: Scenario, interface: Settings, rows: int) -> ConcatVectorEnv:
     """The rows, divided among the scenarios."""
     scenarios = [scenario, *(scenario.override(**world_of(text)) for text in settings.vary or ())]
-    shares = np.diff(np.arange(len(scenarios) + 1) * rows // len(scenarios))
     parts = []
-    for place, (one, share) in enumerate(zip(scenarios, shares)):
+    for place, (one, share) in enumerate(zip(scenarios, shares(settings, rows))):
         rows_of: Callable[..., ClusterVectorEnv] = ClusterVectorEnv
         if settings.steering:
             rows_of = partial(PricedVectorEnv, steering=settings.steering)
-        envs = rows_of(int(share), one, autoreset_mode="Disabled", **asdict(interface))
+        envs = rows_of(share, one, autoreset_mode="Disabled", **asdict(interface))
         told = PrivilegedVectorEnv(envs, place, len(scenarios)) if settings.privileged else envs
         parts.append(TrainingReward(told, calibrated=settings.reward == "belief"))
     return ConcatVectorEnv(parts)
+
+
+def shares(settings: Training, rows: int) -> list[int]:
+    """How many rows each scenario has."""
+    count = len(settings.vary or ()) + 1
+    return np.diff(np.arange(count + 1) * rows // count).tolist()
 
 
 def check_settings(settings: Training) -> None:
@@ -379,6 +388,10 @@ def settings_as_json(settings: Training) -> dict:
 def make_model(settings: Training, envs) -> PPO:
     """A new model."""
     kind, shape = architecture(settings, envs)
+    buffer: dict[str, Any] = {}
+    if settings.even_worlds:
+        rows = shares(settings, settings.rows)
+        buffer = dict(rollout_buffer_class=EvenWorldsBuffer, rollout_buffer_kwargs={"rows": rows})
     return PPO(
         kind,
         envs,
@@ -393,6 +406,7 @@ def make_model(settings: Training, envs) -> PPO:
         stats_window_size=1000,  # episodes: each has a lam of its own, so that fewer would tell little
         seed=settings.seed,
         device="cpu",
+        **buffer,
     )
 
 

@@ -15,6 +15,7 @@ from wsn_env.compiled.kernels import kernel, lean_piece, piece
 from wsn_env.filters.kernels import redraw_row
 from wsn_env.filters.resampling import correlated, lower_root
 from wsn_env.models.measurement.base import PositionBelief, at_point, linearise, node_at, unwrap
+from wsn_env.models.motion.modes import ACCELERATION, COUNT, DRAWN, DRAWS, LEAVES, SIN, STEPS
 from wsn_env.models.motion.prediction import advance
 from wsn_env.models.state import Belief, Network, Reports, State, knowledge_at, state_at
 from wsn_env.scenario import Scenario
@@ -22,16 +23,20 @@ from wsn_env.scenario.constants import constants
 from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World
 
+GOLDEN = 0.5 * (5**0.5 - 1.0)  # its multiples spread evenly over [0, 1)
+
 
 def imagined_world(scenario: Scenario, periods: int, particles: int) -> World:
-    """The scenario with another horizon, a cheap filter at the head, and no faults, of which the network knows nothing;
-    prices and noises are the same.
+    """The scenario with another horizon, a cheap filter at the head, a target that moves as the filter supposes, and no
+    faults, of which the network knows nothing; prices and noises are the same.
 
     Args:
         particles: of a particle filter; 0: a `GaussianTracker`, which cannot read binary sensors.
     """
-    changes: dict[str, Any] = dict(periods=periods, motion="straight", filter_q=scenario.filter_q, faults=None)
-    changes |= dict(tracker="particle", particles=max(particles, 2), gate_m=None, manoeuvre_q=None)
+    changes: dict[str, Any] = dict(periods=periods, motion="straight", faults=None)
+    changes |= dict(tracker="particle", particles=max(particles, 2), gate_m=None)
+    if not scenario.tracking.switches:
+        changes |= dict(filter_q=scenario.filter_q, manoeuvre_q=None)
     if scenario.radio.handover == "particles":  # as many as there really are
         changes |= dict(handover="estimate", handover_bits=scenario.handover_bits)
     world = World(scenario.override(**changes), threads=1)
@@ -43,21 +48,24 @@ def imagined_world(scenario: Scenario, periods: int, particles: int) -> World:
 def draw_worlds(state: State, view: View, world: World, first: int, count: int) -> None:
     """Fill a state with worlds number first, ..., first + count - 1, drawn from a belief, again and again.
 
-    The target comes from the belief's mean and covariance (eqs. 9-13 of Xiang & Guo, 2013, say what these are) and
-    moves by constant velocity with the filter's noise (eq. 8). Worlds 2i and 2i + 1 lie on opposite sides of the mean.
-    A world's draws depend on its number and the view's `random_bits` alone.
+    The target comes from the belief's mean and covariance (eqs. 9-13 of Xiang & Guo, 2013, say what these are). It
+    switches between the filter's modes of motion, from one that the belief's probabilities give; where the filter has
+    none, it moves by constant velocity with its noise (eq. 8). Worlds 2i and 2i + 1 lie on opposite sides of the mean
+    and share their modes. A world's draws depend on its number and the view's `random_bits` alone.
 
     Args:
         state: (n * count rows) filled; row b is world first + b % count.
         view: of one row.
         world: of the `imagined_world`.
     """
-    about = world.scenario.filter_q, world.scenario.period_s, world.scenario.tracking.search_gap
-    _draw_worlds(first, count, *about, state.handle, view.knowledge.handle)
+    scenario, tracking = world.scenario, world.scenario.tracking
+    motion = scenario.period_s, scenario.filter_q, (tracking.manoeuvre_q or 0.0) if tracking.switches else 0.0
+    _draw_worlds(first, count, motion, tracking.search_gap, state.handle, view.knowledge.handle)
 
 
 @kernel
-def _draw_worlds(first, count, q, period_s, search_gap, handle, knowledge_handle):
+def _draw_worlds(first, count, motion, search_gap, handle, knowledge_handle):
+    period_s, q, manoeuvre_q = motion
     state, known = state_at(handle), knowledge_at(knowledge_handle)
     row, belief, bitmap = known.row[0], known.belief[0], known.reports.bitmap[0]
     for b in range(len(state.key)):
@@ -73,6 +81,8 @@ def _draw_worlds(first, count, q, period_s, search_gap, handle, knowledge_handle
         own.predicted_mean[:], own.predicted_cov[:] = belief.predicted_mean, belief.predicted_cov
         if state.belief.particles.shape[2] > 0:
             redraw_row(key, 0, state.belief, b)
+            _allot(state.belief.modes[b], belief.mode_probabilities)
+        own.mode_probabilities[:] = belief.mode_probabilities
         _copy_network(known.network, state, b)
         state.reports.count[b] = 0
         state.reports.bitmap[b] = bitmap
@@ -82,9 +92,50 @@ def _draw_worlds(first, count, q, period_s, search_gap, handle, knowledge_handle
         track, off = state.track[b], correlated(draws.stream(pair, 0, draws.START), 0, lower_root(own.cov))
         for axis in range(4):
             track[0, axis] = own.mean[axis] + side * off[axis]
+        mode = _mode_at(draws.uniform(draws.stream(pair, 0, draws.PROCESS), 0), belief.mode_probabilities)
         for k in range(len(track) - 1):
             ax, ay = draws.normal_pair(draws.stream(pair, 0, draws.TRACK), k)
-            advance(track[k], period_s, side * q * ax, side * q * ay, track[k + 1])
+            if manoeuvre_q > 0.0:
+                own_q = side * manoeuvre_q * ACCELERATION[mode]
+                _advance_turning(track[k], SIN[mode], period_s, own_q * ax, own_q * ay, track[k + 1])
+                mode = _next_mode(mode, draws.stream(pair, 0, draws.PROCESS), k)
+            else:
+                advance(track[k], period_s, side * q * ax, side * q * ay, track[k + 1])
+
+
+@lean_piece
+def _mode_at(share, probabilities):
+    """The mode at a share in [0, 1) of all probability."""
+    for k in range(COUNT - 1):
+        share -= probabilities[k]
+        if share < 0.0:
+            return k
+    return COUNT - 1
+
+
+@lean_piece
+def _next_mode(mode, stream, period):
+    """The target keeps its mode or draws another."""
+    if draws.uniform(stream, 1 + 2 * period) * STEPS >= LEAVES[mode]:
+        return mode
+    return np.int64(DRAWN[np.int64(draws.uniform(stream, 2 + 2 * period) * DRAWS)])
+
+
+@lean_piece
+def _advance_turning(state, sin, period_s, ax, ay, out):
+    """v' = R v + T a and x' = x + T (v + v') / 2, as the filter's particles move."""
+    cos = np.sqrt(1.0 - sin * sin)
+    out[1] = cos * state[1] - sin * state[3] + period_s * ax
+    out[3] = sin * state[1] + cos * state[3] + period_s * ay
+    out[0] = state[0] + 0.5 * period_s * (state[1] + out[1])
+    out[2] = state[2] + 0.5 * period_s * (state[3] + out[3])
+
+
+@lean_piece
+def _allot(modes, probabilities):
+    """Modes (P,) in these shares, in no order of the particles."""
+    for i in range(len(modes)):
+        modes[i] = _mode_at((i + 0.5) * GOLDEN % 1.0, probabilities)
 
 
 @lean_piece

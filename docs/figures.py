@@ -30,7 +30,7 @@ IMAGES = HERE / "images"
 RUNS = "out/figures/runs"
 TRACKS = sorted(map(str, (ROOT / "out" / "tracks").glob("*.csv")))  # as examples/ble_tracks.py makes them
 RECORDED = ["--tracks", *TRACKS] if TRACKS else []  # without them tables lack the row of recorded motion
-SHIPPED = ("PreDC-v0", "Rssi-v0")  # whose policy is compared in many worlds
+SHIPPED = ("PreDC-v0", "Rssi-v0", "Binary-v0", "Anchors-v0", "Underwater-v0")  # whose policy is compared in many worlds
 FAULTS = [  # that a policy is trained with, beside those of none in fewer and in more nodes
     *("nodes=75", "nodes=450", "faults=failures,share=0.3", "faults=regional_failure,region_m=25"),
     *("faults=stuck,share=0.1", "faults=biased,bias_m=5", "faults=misplaced,position_sd_m=1"),

@@ -68,6 +68,14 @@ MOTIONS = {  # what a filter may have to follow, in PreDC-v0
     "walk": "motion=walk",
     "crossing, with a stop": "faults=stops",
 }
+USUAL_RIVALS = {
+    "size by the belief's spread, tuned for each lam": "adaptive",
+    "information for energy, tuned for each lam": "greedy",
+}
+INFORMED_RIVALS = {
+    "the same, size by the belief's spread, tuned for each lam": "adaptive_informed",
+    "information for energy, tuned for each lam": "greedy",
+}
 FIXED_Q = (0.0125, 0.025, 0.05, 0.1, 0.2, 0.4)  # m/s^2
 MANOEUVRE_Q = 0.6
 LOST_M = 20.0  # an episode's RMS counts as this at most
@@ -180,16 +188,17 @@ def shipped(name: str, episodes: int | None, rules: tuple[str, ...] = (), family
     return ["lam m/mJ", *(f"{lam:g}" for lam in lams)], rows
 
 
-def comparison(name: str, episodes: int | None) -> tuple[list[str], Rows]:
+def comparison(
+    name: str, episodes: int | None, family: str = "nearest", others: dict[str, str] | None = None
+) -> tuple[list[str], Rows]:
     """The policy that comes with the package beside rules, and what it is ahead of them in percent."""
-    scenario, lams = Scenario.named(name), (1.0, 4.0, 16.0)
-    sizes = [f"nearest{n}" for n in range(9)]
-    others = {"size by the belief's spread, tuned for each lam": "adaptive"}
-    others |= {"information for energy, tuned for each lam": "greedy", "Pre-DC": "pre_dc"}
+    scenario, others = Scenario.named(name), USUAL_RIVALS | {"Pre-DC": "pre_dc"} if others is None else others
+    lams, sizes = scenario.lam_octaves[1::2], [f"{family}{n}" for n in range(9)]
     found = evaluate(["ppo", *sizes, *others.values()], scenario, lams, episodes or 1000)
     rows = [["**PPO**", *(f"**{found.values('ppo', lam, 'return').mean():.1f}**" for lam in lams)]]
     best = {lam: best_of(found, sizes, lam) for lam in lams}
-    for label, rule in {"best size in hindsight": "", **others}.items():
+    first = {"nearest": "best size in hindsight"}.get(family, f"best of {family}0..8 in hindsight")
+    for label, rule in {first: "", **others}.items():
         cells = []
         for lam in lams:
             rival = rule or best[lam]
@@ -218,8 +227,29 @@ TABLES: dict[str, Callable[[int | None], tuple[list[str], Rows]]] = {
     "references": references,
     "comparison_PreDC-v0": partial(comparison, "PreDC-v0"),
     "comparison_Rssi-v0": partial(comparison, "Rssi-v0"),
+    "comparison_Binary-v0": partial(
+        comparison,
+        "Binary-v0",
+        family="informed",
+        others=INFORMED_RIVALS | {"who stands at the edge of the disc": "boundary", "Pre-DC": "pre_dc"},
+    ),
+    "comparison_Anchors-v0": partial(
+        comparison,
+        "Anchors-v0",
+        family="informed",
+        others=INFORMED_RIVALS | {"the two nearest and the head": "nearest2"},
+    ),
+    "comparison_Underwater-v0": partial(
+        comparison,
+        "Underwater-v0",
+        family="informed",
+        others=INFORMED_RIVALS | {"strongest signal": "strongest_signal", "Pre-DC": "pre_dc"},
+    ),
     "shipped_PreDC-v0": partial(shipped, "PreDC-v0"),
     "shipped_Rssi-v0": partial(shipped, "Rssi-v0"),
+    "shipped_Binary-v0": partial(shipped, "Binary-v0"),
+    "shipped_Anchors-v0": partial(shipped, "Anchors-v0"),
+    "shipped_Underwater-v0": partial(shipped, "Underwater-v0"),
     "shipped_Ble-v0": partial(shipped, "Ble-v0", rules=("greedy", "all"), family="informed"),
 }
 

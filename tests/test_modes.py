@@ -6,7 +6,7 @@ from numba import njit
 
 from tests.worlds import assert_same, keys_of
 from wsn_env import Cluster, Scenario, View, World, make_policy
-from wsn_env.agents.imagined import imagined_world
+from wsn_env.agents.imagined import draw_worlds, imagined_world, place_nodes
 from wsn_env.compiled import draws
 from wsn_env.envs.features import BELIEF_FEATURES, MOTION_FEATURES
 from wsn_env.envs.observations import make_observation
@@ -188,9 +188,34 @@ def test_a_batch_has_the_bits_of_its_rows():
         assert_same(batch.belief, alone.belief, slice(4, 5))
 
 
-def test_the_planner_plans_with_one_mode():
+def test_targets_that_the_planner_imagines_move_as_the_filter_supposes():
+    """From the belief's modes: after a period their moments are the prediction's."""
+    scenario = scenario_of("turns", particles=400, periods=20)
+    world, policy = World(scenario, threads=1), make_policy("nearest3", scenario)
+    state, rows = world.reset([draws.key_of_seed(3)]), 20_000
+    for _ in range(10):
+        state, _ = world.step(state, policy.act(View.of(state)))
+    own = state.belief.row[0]
+    own["mode_probabilities"] = 0.3, 0.1, 0.4, 0.0, 0.2
+    mean, cov = own["predicted_mean"], own["predicted_cov"]
+    mixture(constants(scenario), own["mean"], own["cov"], own["mode_probabilities"], mean, cov)
+    imagined = imagined_world(scenario, 3, 100)
+    assert imagined.scenario.tracking.switches
+    drawn = imagined.allocate(rows)
+    place_nodes(drawn, View.of(state))
+    draw_worlds(drawn, View.of(state), imagined, 0, rows)
+    ahead = drawn.track[:, 1]
+    pairs = 0.5 * (ahead[::2] + ahead[1::2])  # opposite worlds
+    assert (abs(pairs.mean(axis=0) - mean) < 4 * pairs.std(axis=0) / (rows / 2) ** 0.5 + 1e-9).all()
+    sd = np.sqrt(np.diag(cov))  # tails are heavier than normal
+    assert abs((np.cov(ahead.T) - cov) / np.outer(sd, sd)).max() < 4 * (3 / (rows / 2)) ** 0.5
+    np.testing.assert_allclose(drawn.belief.mode_probabilities[5], own["mode_probabilities"])
+    shares = np.bincount(drawn.belief.modes[7], minlength=COUNT) / 100
+    assert shares == pytest.approx(own["mode_probabilities"], abs=0.03)
+
+
+def test_the_planner_plans_with_them():
     scenario = scenario_of(particles=200, periods=3)
-    assert imagined_world(scenario, 3, 0).scenario.tracking.manoeuvre_q is None
     world, policy = World(scenario, threads=1), make_policy("planner", scenario)
     state = world.reset([3])
     for _ in range(3):

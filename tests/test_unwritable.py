@@ -204,8 +204,8 @@ def nothing_is_played(monkeypatch):
     ("command", "said"),
     [
         (
-            "evaluate --scenario Binary-v0 --policies nearest0 ppo",
-            "policy 'ppo': none comes with the package for Binary-v0, only for Ble-v0, Lifetime-v0, PreDC-v0, Rssi-v0",
+            "evaluate --policies nearest0 ppo:of=Mine-v0",
+            "PPOPolicy.of = 'Mine-v0': allowed are Anchors-v0, Binary-v0, ",
         ),
         ("evaluate --policies nearest0 greedy:terms=3", "terms = 3: must be a list of list of number or None"),
         ("evaluate --policies nearest0 adaptive:order=best", "order 'best' is unknown: did you mean nearest?"),
@@ -214,7 +214,7 @@ def nothing_is_played(monkeypatch):
             "evaluate --scenario Ble-v0 --tracks DATA --policies nearest0 p={track}/policy.json",
             "policy 'walk_0/policy.json' does not exist",
         ),
-        ("replay --policy nearest0 ppo --scenario Binary-v0", "policy 'ppo': none comes with the package"),
+        ("replay --policy nearest0 ppo:of=Mine-v0", "PPOPolicy.of = 'Mine-v0': allowed are"),
         ("replay --policy nearest0 --out file/page.html", "file: must be a folder that files can be written to"),
         ("replay --policy nearest0 --out .", "is a folder: must be a regular file, or not exist yet"),
         ("reproduce all --out out", "out/grnn: must be a folder that files can be written to: File exists"),

@@ -86,7 +86,7 @@ MISTAKES = {
         wsn evaluate --policies none/policy.json
         wsn evaluate --policies policy.json
         wsn evaluate --policies weights.json
-        wsn evaluate --policies ppo --scenario Anchors-v0
+        wsn evaluate --policies ppo:of=Mine-v0
         Cluster.of([1, 2], 3)
     """,
     "Evaluations": """
