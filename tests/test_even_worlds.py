@@ -51,7 +51,7 @@ def test_rows_that_do_not_add_up_are_refused():
 @pytest.mark.parametrize("even", [True, False])
 def test_a_training_takes_the_worlds_that_it_has(even):
     settings = train.Training(
-        rows=20, rollout=4, set=["particles=50"], vary=["nodes=81", "nodes=400"], even_worlds=even
+        rows=20, rollout=4, batch=80, set=["particles=50"], vary=["nodes=81", "nodes=400"], even_worlds=even
     )
     scenario = train.complete_settings(settings)
     interface = train.Settings(settings.action, "menu", settings.reward, settings.order)
