@@ -128,9 +128,9 @@ class Training:
     """Discount per period."""
     gae_lambda: float = 0.7
     """Of the generalised advantage estimate."""
-    even_worlds: bool = True
-    """Bring the advantages in each scenario to one size, lest those decide in which costs vary most. The engine ray
-    leaves them as they are."""
+    even_worlds: bool | None = None
+    """Bring the advantages in each scenario to one size, lest those decide in which costs vary most. Left out: with the
+    engine local; ray cannot."""
     entropy: float = 5e-4
     """Weight of the entropy bonus."""
     network: Literal["entries", "flat"] = "entries"
@@ -232,6 +232,8 @@ def complete_settings(settings: Training) -> Scenario:
         settings.order = scenario.measurement.order
     if settings.privileged is None:
         settings.privileged = settings.network == "entries"
+    if settings.even_worlds is None:
+        settings.even_worlds = settings.engine == "local"
     if settings.steering is None:
         settings.steering = float(scenario.scarce_energy)
     if settings.episodes is None:
@@ -323,21 +325,16 @@ def learn_on_ray(settings: Training, scenario: Scenario, interface: Settings, fo
 def make_envs(settings: Training, scenario: Scenario, interface: Settings, rows: int) -> ConcatVectorEnv:
     """The rows, divided among the scenarios."""
     scenarios = [scenario, *(scenario.override(**world_of(text)) for text in settings.vary or ())]
+    shares = np.diff(np.arange(len(scenarios) + 1) * rows // len(scenarios))
     parts = []
-    for place, (one, share) in enumerate(zip(scenarios, shares(settings, rows))):
+    for place, (one, share) in enumerate(zip(scenarios, shares)):
         rows_of: Callable[..., ClusterVectorEnv] = ClusterVectorEnv
         if settings.steering:
             rows_of = partial(PricedVectorEnv, steering=settings.steering)
-        envs = rows_of(share, one, autoreset_mode="Disabled", **asdict(interface))
+        envs = rows_of(int(share), one, autoreset_mode="Disabled", **asdict(interface))
         told = PrivilegedVectorEnv(envs, place, len(scenarios)) if settings.privileged else envs
         parts.append(TrainingReward(told, calibrated=settings.reward == "belief"))
     return ConcatVectorEnv(parts)
-
-
-def shares(settings: Training, rows: int) -> list[int]:
-    """How many rows each scenario has."""
-    count = len(settings.vary or ()) + 1
-    return np.diff(np.arange(count + 1) * rows // count).tolist()
 
 
 def check_settings(settings: Training) -> None:
@@ -364,6 +361,8 @@ def check_settings(settings: Training) -> None:
     check_quantity("Training", "runners", settings.runners, at_least=0, whole=True)
     if settings.engine == "ray" and settings.network != "entries":
         raise ValueError(f"Training.network = {settings.network!r}: the engine ray trains only 'entries'")
+    if settings.engine == "ray" and settings.even_worlds:
+        raise ValueError("Training.even_worlds = True: must be False with --engine ray")
     shares = 1 if settings.engine == "local" else max(1, settings.runners)
     others = len(settings.vary or ())
     if settings.rows // shares <= others:
@@ -390,7 +389,8 @@ def make_model(settings: Training, envs) -> PPO:
     kind, shape = architecture(settings, envs)
     buffer: dict[str, Any] = {}
     if settings.even_worlds:
-        rows = shares(settings, settings.rows)
+        (worlds,) = envs.get_attr("parts", 0)
+        rows = [world.num_envs for world in worlds]
         buffer = dict(rollout_buffer_class=EvenWorldsBuffer, rollout_buffer_kwargs={"rows": rows})
     return PPO(
         kind,

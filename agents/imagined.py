@@ -15,15 +15,13 @@ from wsn_env.compiled.kernels import kernel, lean_piece, piece
 from wsn_env.filters.kernels import redraw_row
 from wsn_env.filters.resampling import correlated, lower_root
 from wsn_env.models.measurement.base import PositionBelief, at_point, linearise, node_at, unwrap
-from wsn_env.models.motion.modes import ACCELERATION, COUNT, DRAWN, DRAWS, LEAVES, SIN, STEPS
+from wsn_env.models.motion.modes import advance_in_mode, mode_at, next_mode
 from wsn_env.models.motion.prediction import advance
 from wsn_env.models.state import Belief, Network, Reports, State, knowledge_at, state_at
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import constants
 from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World
-
-GOLDEN = 0.5 * (5**0.5 - 1.0)  # its multiples spread evenly over [0, 1)
 
 
 def imagined_world(scenario: Scenario, periods: int, particles: int) -> World:
@@ -59,7 +57,7 @@ def draw_worlds(state: State, view: View, world: World, first: int, count: int) 
         world: of the `imagined_world`.
     """
     scenario, tracking = world.scenario, world.scenario.tracking
-    motion = scenario.period_s, scenario.filter_q, (tracking.manoeuvre_q or 0.0) if tracking.switches else 0.0
+    motion = scenario.period_s, scenario.filter_q, tracking.manoeuvre_q or 0.0
     _draw_worlds(first, count, motion, tracking.search_gap, state.handle, view.knowledge.handle)
 
 
@@ -81,7 +79,9 @@ def _draw_worlds(first, count, motion, search_gap, handle, knowledge_handle):
         own.predicted_mean[:], own.predicted_cov[:] = belief.predicted_mean, belief.predicted_cov
         if state.belief.particles.shape[2] > 0:
             redraw_row(key, 0, state.belief, b)
-            _allot(state.belief.modes[b], belief.mode_probabilities)
+            for i in range(state.belief.modes.shape[1]):
+                share = draws.uniform(draws.stream(key, 0, draws.RESAMPLING), i)
+                state.belief.modes[b, i] = mode_at(share, belief.mode_probabilities)
         own.mode_probabilities[:] = belief.mode_probabilities
         _copy_network(known.network, state, b)
         state.reports.count[b] = 0
@@ -92,50 +92,17 @@ def _draw_worlds(first, count, motion, search_gap, handle, knowledge_handle):
         track, off = state.track[b], correlated(draws.stream(pair, 0, draws.START), 0, lower_root(own.cov))
         for axis in range(4):
             track[0, axis] = own.mean[axis] + side * off[axis]
-        mode = _mode_at(draws.uniform(draws.stream(pair, 0, draws.PROCESS), 0), belief.mode_probabilities)
+        switches = draws.stream(pair, 0, draws.PROCESS)
+        mode = mode_at(draws.uniform(switches, 0), belief.mode_probabilities)
         for k in range(len(track) - 1):
             ax, ay = draws.normal_pair(draws.stream(pair, 0, draws.TRACK), k)
             if manoeuvre_q > 0.0:
-                own_q = side * manoeuvre_q * ACCELERATION[mode]
-                _advance_turning(track[k], SIN[mode], period_s, own_q * ax, own_q * ay, track[k + 1])
-                mode = _next_mode(mode, draws.stream(pair, 0, draws.PROCESS), k)
+                advance_in_mode(
+                    mode, track[k], period_s, side * manoeuvre_q * ax, side * manoeuvre_q * ay, track[k + 1]
+                )
+                mode = next_mode(mode, draws.uniform(switches, 1 + 2 * k), draws.uniform(switches, 2 + 2 * k))
             else:
                 advance(track[k], period_s, side * q * ax, side * q * ay, track[k + 1])
-
-
-@lean_piece
-def _mode_at(share, probabilities):
-    """The mode at a share in [0, 1) of all probability."""
-    for k in range(COUNT - 1):
-        share -= probabilities[k]
-        if share < 0.0:
-            return k
-    return COUNT - 1
-
-
-@lean_piece
-def _next_mode(mode, stream, period):
-    """The target keeps its mode or draws another."""
-    if draws.uniform(stream, 1 + 2 * period) * STEPS >= LEAVES[mode]:
-        return mode
-    return np.int64(DRAWN[np.int64(draws.uniform(stream, 2 + 2 * period) * DRAWS)])
-
-
-@lean_piece
-def _advance_turning(state, sin, period_s, ax, ay, out):
-    """v' = R v + T a and x' = x + T (v + v') / 2, as the filter's particles move."""
-    cos = np.sqrt(1.0 - sin * sin)
-    out[1] = cos * state[1] - sin * state[3] + period_s * ax
-    out[3] = sin * state[1] + cos * state[3] + period_s * ay
-    out[0] = state[0] + 0.5 * period_s * (state[1] + out[1])
-    out[2] = state[2] + 0.5 * period_s * (state[3] + out[3])
-
-
-@lean_piece
-def _allot(modes, probabilities):
-    """Modes (P,) in these shares, in no order of the particles."""
-    for i in range(len(modes)):
-        modes[i] = _mode_at((i + 0.5) * GOLDEN % 1.0, probabilities)
 
 
 @lean_piece

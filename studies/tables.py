@@ -68,14 +68,9 @@ MOTIONS = {  # what a filter may have to follow, in PreDC-v0
     "walk": "motion=walk",
     "crossing, with a stop": "faults=stops",
 }
-USUAL_RIVALS = {
-    "size by the belief's spread, tuned for each lam": "adaptive",
-    "information for energy, tuned for each lam": "greedy",
-}
-INFORMED_RIVALS = {
-    "the same, size by the belief's spread, tuned for each lam": "adaptive_informed",
-    "information for energy, tuned for each lam": "greedy",
-}
+GREEDY = {"information for energy, tuned for each lam": "greedy"}  # rivals of the policy that comes with the package
+NEAREST = {"size by the belief's spread, tuned for each lam": "adaptive"} | GREEDY | {"Pre-DC": "pre_dc"}
+INFORMED = {"the same, size by the belief's spread, tuned for each lam": "adaptive_informed"} | GREEDY
 FIXED_Q = (0.0125, 0.025, 0.05, 0.1, 0.2, 0.4)  # m/s^2
 MANOEUVRE_Q = 0.6
 LOST_M = 20.0  # an episode's RMS counts as this at most
@@ -188,17 +183,14 @@ def shipped(name: str, episodes: int | None, rules: tuple[str, ...] = (), family
     return ["lam m/mJ", *(f"{lam:g}" for lam in lams)], rows
 
 
-def comparison(
-    name: str, episodes: int | None, family: str = "nearest", others: dict[str, str] | None = None
-) -> tuple[list[str], Rows]:
+def comparison(name: str, episodes: int | None, family: str, others: dict[str, str]) -> tuple[list[str], Rows]:
     """The policy that comes with the package beside rules, and what it is ahead of them in percent."""
-    scenario, others = Scenario.named(name), USUAL_RIVALS | {"Pre-DC": "pre_dc"} if others is None else others
-    lams, sizes = scenario.lam_octaves[1::2], [f"{family}{n}" for n in range(9)]
+    scenario, sizes = Scenario.named(name), [f"{family}{n}" for n in range(9)]
+    lams = scenario.lam_octaves[1::2]
     found = evaluate(["ppo", *sizes, *others.values()], scenario, lams, episodes or 1000)
     rows = [["**PPO**", *(f"**{found.values('ppo', lam, 'return').mean():.1f}**" for lam in lams)]]
     best = {lam: best_of(found, sizes, lam) for lam in lams}
-    first = {"nearest": "best size in hindsight"}.get(family, f"best of {family}0..8 in hindsight")
-    for label, rule in {first: "", **others}.items():
+    for label, rule in {f"best of {family}0..8 in hindsight": "", **others}.items():
         cells = []
         for lam in lams:
             rival = rule or best[lam]
@@ -225,25 +217,25 @@ TABLES: dict[str, Callable[[int | None], tuple[list[str], Rows]]] = {
     "motions": motions,
     "anchors": anchors,
     "references": references,
-    "comparison_PreDC-v0": partial(comparison, "PreDC-v0"),
-    "comparison_Rssi-v0": partial(comparison, "Rssi-v0"),
+    "comparison_PreDC-v0": partial(comparison, "PreDC-v0", family="nearest", others=NEAREST),
+    "comparison_Rssi-v0": partial(comparison, "Rssi-v0", family="nearest", others=NEAREST),
     "comparison_Binary-v0": partial(
         comparison,
         "Binary-v0",
         family="informed",
-        others=INFORMED_RIVALS | {"who stands at the edge of the disc": "boundary", "Pre-DC": "pre_dc"},
+        others=INFORMED | {"who stands at the edge of the disc": "boundary", "Pre-DC": "pre_dc"},
     ),
     "comparison_Anchors-v0": partial(
         comparison,
         "Anchors-v0",
         family="informed",
-        others=INFORMED_RIVALS | {"the two nearest and the head": "nearest2"},
+        others=INFORMED | {"the two nearest and the head": "nearest2"},
     ),
     "comparison_Underwater-v0": partial(
         comparison,
         "Underwater-v0",
         family="informed",
-        others=INFORMED_RIVALS | {"strongest signal": "strongest_signal", "Pre-DC": "pre_dc"},
+        others=INFORMED | {"strongest signal": "strongest_signal", "Pre-DC": "pre_dc"},
     ),
     "shipped_PreDC-v0": partial(shipped, "PreDC-v0"),
     "shipped_Rssi-v0": partial(shipped, "Rssi-v0"),

@@ -25,7 +25,7 @@ from wsn_env.evaluation.kept_blocks import remove_kept_blocks
 from wsn_env.evaluation.policies import make_policy
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.learning.worlds import nodes_of, noises
-from wsn_env.models.quantity import parse_overrides
+from wsn_env.models.quantity import check_quantity, parse_overrides
 from wsn_env.reports.markdown import markdown_table
 from wsn_env.scenario import Scenario
 
@@ -74,6 +74,7 @@ class Cell(NamedTuple):
 def main() -> int:
     """Run."""
     asked = tyro.cli(Worlds, description=__doc__)
+    check_quantity("Worlds", "episodes", asked.episodes, at_least=2, whole=True)
     usual = make_scenario(asked.scenario, [], [])
     usual = usual.override(particles=min(asked.particles, usual.tracking.particles))
     worlds = {text: text for text in asked.worlds} or worlds_of(usual)
@@ -123,15 +124,12 @@ def worlds_of(scenario: Scenario) -> dict[str, str]:
 
 def lead_of(policy: str, evaluation: Evaluation, lam: float) -> Cell:
     """Over the rule with the highest mean return."""
-    rules = [name for name in evaluation.policies if name != policy]
-    returns, own = (np.stack([evaluation.values(name, lam, "return") for name in names]) for names in (rules, [policy]))
-    theirs, fold = np.empty(returns.shape[1]), np.arange(returns.shape[1]) % FOLDS
-    for each in range(FOLDS):
-        others = fold != each if (fold != each).any() else fold == each
-        theirs[fold == each] = returns[returns[:, others].mean(axis=1).argmax(), fold == each]
-    best = returns.mean(axis=1).argmax()
-    leads = [Summary.of(100 * (own[0] - each) / abs(each.mean())) for each in (theirs, returns[best])]
-    return Cell(*leads, rules[best])
+    own, rules = evaluation.values(policy, lam, "return"), [name for name in evaluation.ranked(lam) if name != policy]
+    returns, episode = np.stack([evaluation.values(rule, lam, "return") for rule in rules]), np.arange(len(own))
+    fold = episode % FOLDS
+    best = np.array([returns[:, fold != each].mean(axis=1).argmax() for each in range(FOLDS)])  # in the other folds
+    leads = [Summary.of(100 * (own - each) / abs(each.mean())) for each in (returns[best[fold], episode], returns[0])]
+    return Cell(*leads, rules[0])
 
 
 def count(cells: list[Cell]) -> str:

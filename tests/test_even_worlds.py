@@ -43,11 +43,6 @@ def test_a_world_without_differences_moves_nothing():
     assert (even.advantages[:, :2] == 0).all() and np.isfinite(even.advantages).all()
 
 
-def test_rows_that_do_not_add_up_are_refused():
-    with pytest.raises(ValueError, match=r"rows = \[2, 2\]: must be 5 together"):
-        filled(EvenWorldsBuffer, np.zeros((3, 5), np.float32), rows=[2, 2])
-
-
 @pytest.mark.parametrize("even", [True, False])
 def test_a_training_takes_the_worlds_that_it_has(even):
     settings = train.Training(
@@ -56,6 +51,6 @@ def test_a_training_takes_the_worlds_that_it_has(even):
     scenario = train.complete_settings(settings)
     interface = train.Settings(settings.action, "menu", settings.reward, settings.order)
     envs = train.make_envs(settings, scenario, interface, settings.rows)
-    assert [part.num_envs for part in envs.parts] == train.shares(settings, 20) == [6, 7, 7]
+    assert [part.num_envs for part in envs.parts] == [6, 7, 7]
     buffer = train.make_model(settings, train.ReplayableRows(SB3VecEnv(envs, stagger=True))).rollout_buffer
     assert isinstance(buffer, EvenWorldsBuffer) == even

@@ -415,6 +415,7 @@ def test_damaged_files_say_so(run, tmp_path):
         dict(action="subsets"),
         dict(engine="rays"),
         dict(engine="ray", network="flat"),
+        dict(even_worlds=True, engine="ray"),
         dict(address="auto"),
         dict(runners=-1),
         dict(rows=5, engine="ray"),

@@ -22,8 +22,6 @@ class EvenWorldsBuffer(RolloutBuffer):
     def __init__(self, *args: Any, rows: Sequence[int], **settings: Any) -> None:
         self._ends = np.cumsum(rows)
         super().__init__(*args, **settings)
-        if self._ends[-1] != self.n_envs:
-            raise ValueError(f"rows = {list(rows)}: must be {self.n_envs} together")
 
     def compute_returns_and_advantage(self, last_values: torch.Tensor, dones: np.ndarray) -> None:
         """Returns, which teach the critic, stay as they are."""

@@ -47,6 +47,33 @@ DRAWN = np.array([number for number, mode in enumerate(MODES) for _ in range(mod
 
 
 @lean_piece
+def mode_at(share: float, probabilities: np.ndarray) -> int:
+    """The mode at a share in [0, 1) of all probability (COUNT,)."""
+    for k in range(COUNT - 1):
+        share -= probabilities[k]
+        if share < 0.0:
+            return k
+    return COUNT - 1
+
+
+@lean_piece
+def next_mode(mode: Any, leaves: float, draw: float) -> Any:
+    """The mode of the next period; two numbers from [0, 1) say whether the target leaves its own, and for which."""
+    return mode if leaves * STEPS >= LEAVES[mode] else np.int64(DRAWN[np.int64(draw * DRAWS)])
+
+
+@lean_piece
+def advance_in_mode(mode: int, state: np.ndarray, period_s: float, ax: float, ay: float, out: np.ndarray) -> None:
+    """v' = R v + T a and x' = x + T (v + v') / 2, the acceleration in units of the manoeuvring mode's."""
+    sin, step = SIN[mode], period_s * ACCELERATION[mode]
+    cos = np.sqrt(1.0 - sin * sin)
+    out[1] = cos * state[1] - sin * state[3] + step * ax
+    out[3] = sin * state[1] + cos * state[3] + step * ay
+    out[0] = state[0] + 0.5 * period_s * (state[1] + out[1])
+    out[2] = state[2] + 0.5 * period_s * (state[3] + out[3])
+
+
+@lean_piece
 def predict_mixture(
     mean: np.ndarray, cov: np.ndarray, probabilities: np.ndarray, t: Any, predicted_mean: Any, predicted_cov: Any
 ) -> None:
