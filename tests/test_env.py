@@ -257,6 +257,21 @@ def test_environments_survive_pickle_and_deepcopy():
     assert all(same(step[0], twin.step(13)[0]) for twin in twins)
 
 
+@pytest.mark.parametrize("observation", ["candidates", "menu", "dict"])
+def test_observations_are_those_of_one_who_encodes_all_anew(observation):
+    """After steps, with more members than there was room for, and where some rows alone begin; of a copy, too."""
+    envs = ClusterVectorEnv(3, autoreset_mode="Disabled", action="nodes", observation=observation, **SMALL)
+    envs.reset(seed=2)
+    anew = {"reset_mask": np.array([False, True, False])}
+    many, few = np.ones((3, 40), int), np.eye(3, 40, dtype=int)
+    for twin in (copy.deepcopy(envs), pickle.loads(pickle.dumps(envs)), envs):
+        for make in (
+            *(lambda: twin.reset(options=anew), lambda: twin.step(few), lambda: twin.step(many)),
+            *(lambda: twin.reset(options=anew), lambda: twin.step(many), lambda: twin.step(few)),
+        ):
+            assert same(make()[0], twin.interface.observation.encode(twin.view))
+
+
 @pytest.mark.parametrize(
     "keywords,words",
     [

@@ -57,7 +57,7 @@ def test_a_row_replays_in_the_environment(evaluation):
         assert row["rms_m"] == pytest.approx(info["episode_rms_m"], rel=1e-12)
         assert (
             row["reference_m"] == info["episode_reference_m"]
-            and row["reference_all_awake_m"] == info["episode_reference_all_awake_m"]
+            and row["reference_all_awake_m"] == env.unwrapped.reference_all_awake_m()
         )
         assert row["energy_mj"] == pytest.approx(np.mean([info["energy_mj"] for info in infos]), rel=1e-12)
         assert row["members"] == np.mean([info["members"] for info in infos])

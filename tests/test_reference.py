@@ -139,10 +139,14 @@ def test_where_it_is(name, overrides, there):
     env.step(10)
     *_, last = env.step(10)
     assert ("reference_m" in first) == ("reference_m" in last) == there
-    assert ("episode_reference_m" in last) == ("episode_reference_all_awake_m" in last) == there
-    if not there:
+    assert ("episode_reference_m" in last) == there
+    if there:
+        assert 0 < env.reference_all_awake_m() <= last["episode_reference_m"] * (1 + 1e-12)
+    else:
         with pytest.raises(ValueError, match="Binary"):
             Reference(scenario)
+        with pytest.raises(ValueError, match="Binary"):
+            env.reference_all_awake_m()
 
 
 def test_a_motion_without_noise_takes_the_filters():
@@ -188,9 +192,11 @@ def test_infos_of_vector_and_single_agree(name, mode):
         *_, infos = envs.step(np.full(3, 12))
         *_, info = env.step(12)
     last = infos["final_info"] if mode == "SameStep" else infos
-    for key in ("reference_m", "episode_reference_m", "episode_reference_all_awake_m"):
+    for key in ("reference_m", "episode_reference_m"):
         assert (key in last) == (key in info)
         assert key not in info or last[key][1] == info[key]
+    if mode == "NextStep" and "reference_m" in info:
+        assert envs.reference_all_awake_m()[1] == env.reference_all_awake_m()
     again = env.reset()[1]
     if mode == "NextStep":
         *_, infos = envs.step(np.full(3, 12))

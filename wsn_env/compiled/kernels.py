@@ -99,10 +99,11 @@ class Kernel:
         return made[0](*arguments) if made else self._first(*arguments)
 
     def made_for(self, arguments: tuple[Any, ...]) -> Callable[..., Any]:
-        """What is called for such arguments, which have been met before."""
-        if self._place < 0 or numba.config.DISABLE_JIT:
+        """What is called for such arguments, which have been met before: without Numba's look at their types."""
+        if numba.config.DISABLE_JIT:
             return self.call
-        return self._made[id(arguments[self._place].dtype)][0]
+        dispatcher: Any = self.call if self._place < 0 else self._made[id(arguments[self._place].dtype)][0]
+        return dispatcher.overloads[tuple(map(dispatcher.typeof_pyval, arguments))].entry_point
 
     def _first(self, *arguments: Any) -> Any:
         if numba.config.DISABLE_JIT:
@@ -130,7 +131,11 @@ class Kernel:
 
 
 class Pinned:
-    """A kernel for an owner whose constants are always of one type: that is looked up once, not at every call."""
+    """A kernel for an owner whose arguments are always of the same types: those are looked up at the first call alone.
+
+    To look them up takes longer than a short kernel. Nothing checks later arguments but for their number, and of arrays
+    the dimensions and the size of an element.
+    """
 
     def __init__(self, kernel: Kernel) -> None:
         self._kernel = kernel
@@ -206,6 +211,17 @@ def over_rows(kernel: Any, rows: int, threads: int, *arguments: Any) -> int:
     others = [_pools[threads].submit(kernel, a, b, *arguments) for a, b in zip(bounds[1:], bounds[2:]) if b > a]
     own = kernel(0, bounds[1], *arguments) or 0
     return own + sum(job.result() or 0 for job in others)
+
+
+def bind(kernel: Any, rows: int, threads: int, *arguments: Any) -> Callable[[], int]:
+    """`over_rows` for arguments that stay, as a function of none: for a few rows, quicker.
+
+    Args:
+        kernel: Pinned, that has been called.
+    """
+    if threads == 1 or rows <= SERIAL_ROWS:
+        return functools.partial(kernel.call, 0, rows, *arguments)
+    return functools.partial(over_rows, kernel, rows, threads, *arguments)
 
 
 def threads_for(marked: np.ndarray, threads: int) -> int:

@@ -10,7 +10,7 @@ from gymnasium import spaces
 
 from wsn_env.compiled.kernels import Pinned, kernel, lean_piece
 from wsn_env.envs.expectations import PLACES, REPORTS, Expectations, outlook_of
-from wsn_env.envs.merit import KEEP, NEAREST, ORDERS, RANKED, rank_row
+from wsn_env.envs.merit import KEEP, ORDERS, RANKED, rank_row
 from wsn_env.models.measurement.base import Order
 from wsn_env.models.quantity import short, suggest
 from wsn_env.models.state import KEEP_CLUSTER, Cluster, knowledge_at
@@ -31,7 +31,7 @@ class Action(Protocol):
     space: Any  # the class's own, of Gymnasium
 
     def cluster(self, action: Any, view: View) -> Cluster:
-        """The cluster that the actions (B, ...) name."""
+        """The cluster that the actions (B, ...) name, as `World.advance` takes it."""
         ...
 
     def masks(self, view: View) -> np.ndarray:
@@ -49,19 +49,20 @@ class MenuAction:
             raise ValueError(f"candidates = {candidates}: the menu must have at least {MENU_MEMBERS + 1}")
         self.space: spaces.Discrete = spaces.Discrete(MENU_ENTRIES)
         self._by, self._candidates, self._ring_m = ORDERS.index(order), candidates, scenario.ring_m
+        self._depth = PLACES if order == "nearest" else REPORTS
         self._expectations, self._constants = Expectations(scenario, candidates), common_constants(scenario)
         self._read = Pinned(_read_menu)
 
     def cluster(self, action: Any, view: View) -> Cluster:
         """The cluster that the menu's entries name."""
-        rows = len(view.row)
-        actions = np.ascontiguousarray(_whole_numbers(action, self.space, rows), np.int64)
-        table = self._expectations.of(view, PLACES if self._by == NEAREST else REPORTS).table
-        found, handle = (self._candidates, table), view.knowledge.handle
-        heads, members = np.empty(rows, np.int64), np.empty((rows, GROUP), np.int32)
-        if self._read.call(0, rows, self._constants, handle, (self._by, actions), found, (heads, members)):
+        known = view.knowledge
+        rows = len(known.row)
+        choices = self._by, np.ascontiguousarray(_whole_numbers(action, self.space, rows), np.int64)
+        found = self._candidates, self._expectations.of(view, self._depth).table
+        cluster = Cluster(np.empty(rows, np.int64), np.empty((rows, GROUP), np.int32))
+        if self._read.call(0, rows, self._constants, known.handle, choices, found, cluster[:]):
             raise _refusal(action, self.space)
-        return Cluster(heads, members)
+        return cluster
 
     def masks(self, view: View) -> np.ndarray:
         """(B, 28) bool: what differs from all smaller entries; counts beyond the living, or keeping no head, do not."""
@@ -228,12 +229,12 @@ class ClusterAction:
 
 def _whole_numbers(action: Any, space: Any, rows: int) -> np.ndarray:
     """The actions as an array (rows, ...) of integers."""
-    array = _as_array(action, space)
-    if array.dtype.kind == "b":  # Discrete spaces contain Python's True, and a mask is a choice of nodes
-        array = array.astype(np.int64)
-    if array.dtype.kind not in "iu" or array.shape != (rows, *space.shape):
+    array = action if type(action) is np.ndarray else _as_array(action, space)
+    kind = array.dtype.kind
+    if kind not in "iub" or array.shape != (rows, *space.shape):
         raise _refusal(action, space)
-    return array
+    # Discrete spaces contain Python's True, and a mask is a choice of nodes.
+    return array.astype(np.int64) if kind == "b" else array
 
 
 def _in_range(action: Any, space: Any, rows: int) -> np.ndarray:

@@ -10,23 +10,22 @@ import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.envs.actions import ActionName
+from wsn_env.envs.info import outcome_by_name
 from wsn_env.envs.interface import Interface, Settings, check_options, scenario_of
-from wsn_env.envs.observations import ObservationName
+from wsn_env.envs.observations import Follower, ObservationName
 from wsn_env.envs.one_thread import Busy, one_thread
 from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera, RenderMode
 from wsn_env.envs.rewards import RewardName
 from wsn_env.models.arguments import checked_but
 from wsn_env.models.measurement.base import Order
 from wsn_env.models.quantity import whole_number
-from wsn_env.models.state import OUTCOME, Outcome, State
+from wsn_env.models.state import State
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.quantities import Quantities
 from wsn_env.simulation.lifetime import lifetimes
-from wsn_env.simulation.reference import Reference, has_reference
+from wsn_env.simulation.reference import Reference, has_reference, why_no_reference
 from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World
-
-_OUTCOMES = OUTCOME.names or ()
 
 
 class ClusterEnv(gym.Env):
@@ -77,6 +76,7 @@ class ClusterEnv(gym.Env):
             self.reward_dim: int = 2
         self._busy = Busy()
         self._state: State = None  # type: ignore[assignment]  # until the first reset
+        self._follower: Follower = None  # type: ignore[assignment]  # of the state, for the observation
         self._view: View = None  # type: ignore[assignment]  # shares the state's arrays
         self._shown: View | None = None  # the period's for others, once they have asked
         self._lam, self._period, self._ended = 0.0, 0, False
@@ -91,11 +91,13 @@ class ClusterEnv(gym.Env):
         super().reset(seed=None if seed is None else whole_number("seed", seed, 0))
         state = self.world.allocate(1) if self._state is None else self._state
         key = draws.episode_key(self.np_random)
-        self._state, outcome = self.world.restart(state, [True], np.array([key]), donate=True)
+        outcome = self.world.restart(state, [True], np.array([key]), donate=True)[1]
+        if self._state is None:
+            self._state, self._follower = state, self.interface.observation.follow(state.knowledge)
         self._lam, self._period, self._ended = self._state.lam.item(), 0, False
         self._squares = 0.0
         self._detections = 0
-        info = self._reward_and_info(outcome)[1]
+        info = self.interface.reward_and_info(outcome_by_name(outcome.row), self._lam)[1]
         if self._reference is not None:
             info["reference_m"] = self._reference.begin(self._state).item()
         if self._camera is not None:
@@ -111,8 +113,8 @@ class ClusterEnv(gym.Env):
         if self._ended:
             raise gym.error.ResetNeeded(f"the episode ended after {self._period} periods: call reset()")
         cluster = self.interface.action.cluster(_add_batch_axis(action), self._view)
-        self._state, outcome = self.world.step(self._state, cluster, donate=True)
-        reward, info = self._reward_and_info(outcome)
+        outcome = self.world.advance(self._state, *cluster)
+        reward, info = self.interface.reward_and_info(outcome_by_name(outcome.row), self._lam)
         self._period += 1
         if self._period > self.scenario.unscored:
             self._squares += info["error_m"] * info["error_m"]
@@ -134,11 +136,7 @@ class ClusterEnv(gym.Env):
                 reward, info["reward_rest"] = self.interface.charge_rest(reward, self._lam, left)
             if self._reference is not None:
                 info["episode_reference_m"] = self._reference.episode_m().item()
-                info["episode_reference_all_awake_m"] = self._reference.all_awake_m(self._state).item()
         return self._observe(), reward, terminated, truncated, info
-
-    def _reward_and_info(self, outcome: Outcome) -> tuple[float | np.ndarray, dict[str, Any]]:
-        return self.interface.reward_and_info(dict(zip(_OUTCOMES, outcome.row.item())), self._lam)
 
     @property
     @one_thread
@@ -149,6 +147,21 @@ class ClusterEnv(gym.Env):
         if self._shown is None:
             self._shown = View.of(self._state)
         return self._shown
+
+    @one_thread
+    def reference_all_awake_m(self) -> float:
+        """`episode_reference_m` of the present episode, had every node been awake throughout and every report arrived.
+
+        Looks at every node in range in every period: for the end of an episode.
+
+        Raises:
+            ValueError: for a scenario without a reference.
+        """
+        if self._state is None:
+            raise gym.error.ResetNeeded("call reset() first")
+        if self._reference is None:
+            raise ValueError(why_no_reference(self.scenario))
+        return self._reference.all_awake_m(self._state).item()
 
     @one_thread
     def action_masks(self) -> np.ndarray:
@@ -171,8 +184,8 @@ class ClusterEnv(gym.Env):
             self._camera.close()
 
     def _observe(self) -> Any:
-        self._view, self._shown = View(self._state.knowledge), None
-        arrays = self.interface.observation.encode(self._view)
+        self._view, arrays = self._follower()
+        self._shown = None
         if isinstance(arrays, dict):
             return {name: value[0] if value.ndim > 1 else value.item() for name, value in arrays.items()}
         return arrays[0]

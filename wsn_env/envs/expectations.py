@@ -6,14 +6,15 @@ compiled once for all measurements.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from wsn_env.compiled.arrays import record
-from wsn_env.compiled.kernels import Pinned, every_row, lean_kernel, lean_piece, over_rows, threads_for
+from wsn_env.compiled.arrays import blank, record
+from wsn_env.compiled.kernels import Pinned, bind, every_row, lean_kernel, lean_piece, over_rows, threads_for
 from wsn_env.models.measurement.base import PositionBelief, chance, linearise, node_of, packets_a_report
-from wsn_env.models.state import knowledge_at, sensors_of
+from wsn_env.models.state import Knowledge, knowledge_at, sensors_of
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import constants
 from wsn_env.simulation.geometry import find_candidates
@@ -69,10 +70,10 @@ class Expectations:
     """Of a scenario's views: what the K candidates and the standing cluster are expected to report."""
 
     def __init__(self, scenario: Scenario, candidates: int, threads: int = 1) -> None:
-        self._constants, self._ring_m = constants(scenario), scenario.ring_m
-        self._candidates, self._threads = candidates, threads
+        self._constants, self._candidates, self._threads = constants(scenario), candidates, threads
         self._expect = Pinned(_expect)
         self._scenario, self._key = scenario, ("expected", candidates, id(scenario))
+        self._nearest = "nearest", candidates, scenario.ring_m  # as `View.nearest` keeps them
         self._members = candidates  # for which there is room; more when more are met
 
     def of(self, view: View, depth: int) -> Expected:
@@ -83,21 +84,35 @@ class Expectations:
         """
         known = view.derived.get(self._key)
         if known is None or known.depth < depth:
-            shape = len(view.row), self._candidates
-            candidates = np.empty(shape, np.int64), np.empty(shape)
-            known = self._fill(view, every_row(shape[0]), Expected(*candidates, self._table(*shape), depth), True)
-            self._keep(view, known)
+            rows = len(view.row)
+            known = self.fill(view, self.room(rows, depth), every_row(rows))
         return known
 
-    def renew(self, view: View, depth: int, rows: np.ndarray, before: View) -> Expected:
-        """What `of` gives, for less where only some rows (B,) have changed since the view `before`."""
-        old = before.derived.get(self._key)
-        if old is None or old.depth < depth or old.table.shape[1] < self._candidates + 1 + self._members:
-            return self.of(view, depth)
-        copy = Expected(old.nodes.copy(), old.distances.copy(), old.table.copy(), old.depth)
-        known = self._fill(view, rows, copy, True)
-        self._keep(view, known)
+    def room(self, rows: int, depth: int) -> Expected:
+        """Arrays for `fill`."""
+        shape = rows, self._candidates
+        return Expected(np.empty(shape, np.int64), np.empty(shape), self._table(*shape), depth)
+
+    def fill(self, view: View, known: Expected, rows: np.ndarray) -> Expected:
+        """What `of` gives, in arrays that are there; kept with the view.
+
+        Args:
+            known: arrays that are filled.
+            rows: (B,) bool, which have changed since `known` was filled.
+
+        Returns: `known`, with a wider table where more members stand than it has room for.
+        """
+        known = self._fill(view, rows, known, True)
+        view.derived.update(self.kept(known))
         return known
+
+    def kept(self, known: Expected) -> dict[Any, Any]:
+        """What is kept with a view."""
+        return {self._key: known, self._nearest: known[:2]}
+
+    def bound(self, knowledge: Knowledge, known: Expected) -> Callable[[], int]:
+        """Fills `known` in all rows at each call; returns in how many more members stand than it has room for."""
+        return bind(*self._call(knowledge, every_row(len(known.nodes)), known, True))
 
     def of_nodes(self, view: View, nodes: np.ndarray, depth: int) -> Expected:
         """Of given candidates (B, K)."""
@@ -105,21 +120,20 @@ class Expectations:
         made = Expected(np.ascontiguousarray(nodes, np.int64), np.zeros(shape), self._table(*shape), depth)
         return self._fill(view, every_row(shape[0]), made, False)
 
-    def _keep(self, view, known: Expected) -> None:
-        view.derived[self._key] = known
-        view.derived["nearest", self._candidates, self._ring_m] = known.nodes, known.distances
-
     def _table(self, rows: int, candidates: int) -> np.ndarray:
-        return np.empty((rows, candidates + 1 + self._members), EXPECTED)
+        return blank(EXPECTED, rows, candidates + 1 + self._members)
 
     def _fill(self, view, rows, known: Expected, find: bool) -> Expected:
-        handle, asked, found = view.knowledge.handle, (known.depth, find), known[:3]
-        threads = threads_for(rows, self._threads)
-        if over_rows(self._expect, len(rows), threads, self._constants, handle, asked, rows, found):
+        if over_rows(*self._call(view.knowledge, rows, known, find)):
             self._members = int(view.network.n_members.max())
             wider = known._replace(table=self._table(*known.nodes.shape))
             return self._fill(view, every_row(len(rows)), wider, find)
         return known
+
+    def _call(self, knowledge, rows, known: Expected, find: bool) -> tuple[Any, ...]:
+        """For `over_rows`."""
+        asked, threads = (known.depth, find), threads_for(rows, self._threads)
+        return self._expect, len(rows), threads, self._constants, knowledge.handle, asked, rows, known[:3]
 
 
 @lean_kernel

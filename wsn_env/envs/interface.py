@@ -9,7 +9,6 @@ import numpy as np
 from gymnasium.spaces import Box, Discrete
 
 from wsn_env.envs.actions import Action, ActionName, make_action
-from wsn_env.envs.info import period_info
 from wsn_env.envs.observations import Observation, ObservationName, make_observation
 from wsn_env.envs.rewards import RewardName, make_reward, reward_space
 from wsn_env.models.measurement.base import Order
@@ -78,10 +77,20 @@ class Interface:
         best = np.stack([part.argmax(axis=1) for part in np.split(logits, ends, axis=1)], axis=1)
         return self.action.cluster(best.reshape(len(best), *space.shape), view)
 
-    def reward_and_info(self, outcome: Any, lam: Any) -> tuple[Any, dict[str, Any]]:
-        """A period's reward and info, of arrays (B, ...) or of one row's numbers."""
+    def reward_and_info(self, outcome: dict[str, Any], lam: Any) -> tuple[Any, dict[str, Any]]:
+        """A period's reward, and its info: the outcome, with the reward told apart in error and energy. Of a vector
+        reward these are the parts of the mission's reward at this lam.
+
+        Args:
+            outcome: OUTCOME_FIELDS by name, arrays (B, ...) or one row's numbers; becomes the info.
+            lam: (B,) or a number.
+        """
         reward = self._reward(outcome, lam)
-        return reward, period_info(outcome, lam, reward if self.reward_space is None else None, self._counted)
+        energy = -lam * outcome["energy_mj"]
+        whole = self.reward_space is None
+        outcome["reward_energy"] = energy
+        outcome["reward_error"] = reward - energy if whole else -self._counted(outcome["error_m"])
+        return reward, outcome
 
     def charge_rest(self, reward: Any, lam: Any, periods: Any) -> tuple[Any, Any]:
         """Charge the periods that are left when an episode ends outside the field: ending must never pay.

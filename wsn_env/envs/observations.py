@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 import numpy as np
 from gymnasium import spaces
 
-from wsn_env.compiled.kernels import Pinned, every_row, kernel, lean_piece, over_rows, threads_for
+from wsn_env.compiled.kernels import Pinned, bind, every_row, kernel, lean_piece, over_rows, threads_for
 from wsn_env.envs import features
 from wsn_env.envs.actions import GROUP, MENU_ENTRIES
 from wsn_env.envs.expectations import REPORTS, REPORTS_AHEAD, Expectations, Expected, outlook_of
@@ -21,11 +23,11 @@ from wsn_env.envs.features import (
     describe_row,
 )
 from wsn_env.envs.merit import ORDERS, RANKED, order_row, rank_row
-from wsn_env.envs.prospects import Units, describe_entries, describe_standing, entry_features
+from wsn_env.envs.prospects import describe_entries, describe_standing, entry_features, units_of
 from wsn_env.models.measurement.base import Order
 from wsn_env.models.motion.modes import COUNT
 from wsn_env.models.quantity import suggest
-from wsn_env.models.state import knowledge_at
+from wsn_env.models.state import Knowledge, knowledge_at
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import common_constants
 from wsn_env.simulation.view import View
@@ -42,8 +44,20 @@ class Observation(Protocol):
         """An array or a dict of arrays (B, ...), fresh."""
         ...
 
-    def renew(self, view: View, rows: np.ndarray, before: View, last: Any) -> Any:
-        """What `encode` gives, where only some rows (B,) have changed since `last` was encoded from `before`."""
+    def follow(self, knowledge: Knowledge) -> Follower:
+        """For one state whose arrays change in place."""
+        ...
+
+
+class Follower(Protocol):
+    """Encodes a state's knowledge again and again."""
+
+    def __call__(self, rows: np.ndarray | None = None) -> tuple[View, Any]:
+        """A view of the present knowledge, which shares its arrays, and what `Observation.encode` gives of it.
+
+        Args:
+            rows: (B,) bool, in which it has changed since the last call; None: in all.
+        """
         ...
 
 
@@ -82,24 +96,25 @@ def _encode_candidates_of(b, c, known, found, ranking, out):
 
 
 @kernel
-def _encode_menu(start, stop, cs, handle, found, out, terms):
+def _encode_menu(start, stop, cs, handle, found, out, by):
     """Fill out (B, n): `belief_features`, then `entry_features` of each of the menu's entries. Only in the rows marked.
 
     Args:
         found: as for `_encode_candidates`, to the depth REPORTS_AHEAD.
-        terms: the place in ORDERS, the scenario's typical cost in each row (B,) [m].
+        by: the place in ORDERS.
         The rest: as `_encode_candidates`.
     """
     known, ranking = knowledge_at(handle), np.empty(found[1], RANKED)
     for b in range(start, stop):
         if found[0][b]:
-            _encode_menu_of(b, cs[0], known, terms, found, ranking, out)
+            _encode_menu_of(b, cs[0], known, by, found, ranking, out)
 
 
 @lean_piece
-def _encode_menu_of(b, c, known, terms, found, ranking, out):
-    (by, costs), (_, candidates, table) = terms, found
-    f, outlook, units = out[b], outlook_of(known, b, candidates, table), Units(costs[b], c.typical_energy_mj)
+def _encode_menu_of(b, c, known, by, found, ranking, out):
+    _, candidates, table = found
+    f, outlook = out[b], outlook_of(known, b, candidates, table)
+    units = units_of(outlook.lam, c)
     heading, first = describe_row(known, b, outlook, c, f)
     width = (len(f) - first) // MENU_ENTRIES
     describe_standing(outlook, heading, units, c, f[first : first + width])
@@ -114,14 +129,16 @@ class CandidatesObservation:
     """Flat Box float32: `belief_features`, then CANDIDATE_FEATURES of the K living nodes nearest to the prediction."""
 
     depth, kernel = REPORTS, _encode_candidates
+    _more: tuple[Any, ...] = ()  # what the kernel wants beside
 
     def __init__(self, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> None:
         self.belief: int = len(belief_features(scenario))
         self.shape: tuple[int, int] = self._shape(scenario, candidates)
         size = self.belief + self.shape[0] * self.shape[1]
         self.space: spaces.Box = spaces.Box(-BOUND, BOUND, (size,), np.float32)
-        self._candidates, self._threads, self._scenario = candidates, threads, scenario
-        self._expectations, self._constants = Expectations(scenario, candidates, threads), common_constants(scenario)
+        self._candidates, self._threads = candidates, threads
+        self.expectations: Expectations = Expectations(scenario, candidates, threads)
+        self._constants = common_constants(scenario)
         self._encode = Pinned(self.kernel)
 
     @staticmethod
@@ -131,26 +148,62 @@ class CandidatesObservation:
     def encode(self, view: View) -> np.ndarray:
         """(B, n) float32, fresh."""
         rows = len(view.row)
-        expected = self._expectations.of(view, self.depth)
-        return self._fill(view, every_row(rows), expected, np.empty((rows, *self.space.shape), np.float32))
-
-    def renew(self, view: View, rows: np.ndarray, before: View, last: np.ndarray) -> np.ndarray:
-        """What `encode` gives, for less where few rows have changed.
-
-        Args:
-            rows: (B,) bool, which have changed since `last` was encoded from the view `before`.
-        """
-        return self._fill(view, rows, self._expectations.renew(view, self.depth, rows, before), last.copy())
-
-    def _fill(self, view: View, rows, expected: Expected, out) -> np.ndarray:
-        threads, found = threads_for(rows, self._threads), (rows, self._candidates, expected.table)
-        arguments = self._constants, view.knowledge.handle, found, out, *self._terms(view)
-        over_rows(self._encode, len(rows), threads, *arguments)
+        out = np.empty((rows, *self.space.shape), np.float32)
+        self.fill(view.knowledge, every_row(rows), self.expectations.of(view, self.depth), out)
         return out
 
-    def _terms(self, view: View) -> tuple[Any, ...]:
-        """What the kernel wants beside."""
-        return ()
+    def follow(self, knowledge: Knowledge) -> FlatFollower:
+        """In arrays that stay, row by row where few have changed."""
+        return FlatFollower(self, knowledge)
+
+    def fill(self, knowledge: Knowledge, rows: np.ndarray, expected: Expected, out: np.ndarray) -> None:
+        """Encode into an array (B, n), in the rows marked.
+
+        Args:
+            expected: of the same knowledge, to this observation's depth.
+        """
+        over_rows(*self._call(knowledge, rows, expected, out))
+
+    def bound(self, knowledge: Knowledge, expected: Expected, out: np.ndarray) -> Callable[[], int]:
+        """Does so in all rows at each call."""
+        return bind(*self._call(knowledge, every_row(len(out)), expected, out))
+
+    def _call(self, knowledge, rows, expected: Expected, out) -> tuple[Any, ...]:
+        """For `over_rows`."""
+        threads, found = threads_for(rows, self._threads), (rows, self._candidates, expected.table)
+        return self._encode, len(rows), threads, self._constants, knowledge.handle, found, out, *self._more
+
+
+class FlatFollower:
+    """Of a flat observation."""
+
+    def __init__(self, observation: CandidatesObservation, knowledge: Knowledge) -> None:
+        rows = len(knowledge.row)
+        self._observation, self._knowledge, self._every = observation, knowledge, every_row(rows)
+        self._expected = observation.expectations.room(rows, observation.depth)
+        self._out = np.empty((rows, *observation.space.shape), np.float32)
+        self._kept: dict[Any, Any] = {}  # with a view, and
+        self._calls: tuple[Callable[[], int], ...] = ()  # that renew it and the observation, once both have been made
+
+    def __call__(self, rows: np.ndarray | None = None) -> tuple[View, np.ndarray]:
+        """As Follower."""
+        if rows is None and self._calls:
+            expect, encode = self._calls
+            if not expect():
+                encode()
+                return View(self._knowledge, self._kept.copy()), self._out.copy()
+        view, changed = View(self._knowledge), self._every if rows is None or not self._calls else rows
+        expectations, known = self._observation.expectations, self._expected
+        self._expected = expectations.fill(view, known, changed)
+        self._observation.fill(self._knowledge, changed, self._expected, self._out)
+        if not self._calls or self._expected is not known:
+            self._kept = expectations.kept(self._expected)
+            encode = self._observation.bound(self._knowledge, self._expected, self._out)
+            self._calls = expectations.bound(self._knowledge, self._expected), encode
+        return view, self._out.copy()  # whoever gets it may write into it
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return FlatFollower, (self._observation, self._knowledge)  # the calls hold addresses
 
 
 class MenuObservation(CandidatesObservation):
@@ -160,14 +213,24 @@ class MenuObservation(CandidatesObservation):
 
     def __init__(self, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> None:
         super().__init__(scenario, order, candidates, threads)
-        self._by = ORDERS.index(order)
+        self._more = (ORDERS.index(order),)
 
     @staticmethod
     def _shape(scenario: Scenario, candidates: int) -> tuple[int, int]:
         return MENU_ENTRIES, len(entry_features(scenario))
 
-    def _terms(self, view: View) -> tuple[Any, ...]:
-        return ((self._by, self._scenario.typical_cost(view.lam)),)
+
+@dataclass
+class EncodesAnew:
+    """The follower of an observation that keeps nothing."""
+
+    observation: Observation
+    knowledge: Knowledge
+
+    def __call__(self, rows: np.ndarray | None = None) -> tuple[View, Any]:
+        """As Follower."""
+        view = View(self.knowledge)
+        return view, self.observation.encode(view)
 
 
 class DictObservation:
@@ -193,9 +256,9 @@ class DictObservation:
             "lam": np.minimum(view.lam[:, None].astype(np.float32), self.space["lam"].high[0]),
         }
 
-    def renew(self, view: View, rows: np.ndarray, before: View, last: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """All of it."""
-        return self.encode(view)
+    def follow(self, knowledge: Knowledge) -> EncodesAnew:
+        """All of it, every time."""
+        return EncodesAnew(self, knowledge)
 
 
 class ViewObservation:
@@ -241,9 +304,9 @@ class ViewObservation:
         """A dict of (B, ...) arrays, fresh."""
         return view.as_arrays()
 
-    def renew(self, view: View, rows: np.ndarray, before: View, last: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """All of it."""
-        return self.encode(view)
+    def follow(self, knowledge: Knowledge) -> EncodesAnew:
+        """All of it, every time."""
+        return EncodesAnew(self, knowledge)
 
 
 OBSERVATIONS: dict[str, Any] = {

@@ -49,6 +49,17 @@ class Units(NamedTuple):
     energy_mj: float  # its typical energy
 
 
+@lean_piece
+def units_of(lam: float, c: Any) -> Units:
+    """At this lam [m/mJ]: `Scenario.typical_cost`, compiled.
+
+    Args:
+        c: the scenario's common constants.
+    """
+    cost_m = c.typical_error_m * np.sqrt(1.0 + lam * c.typical_energy_mj / c.typical_error_m)
+    return Units(cost_m, c.typical_energy_mj)
+
+
 class Tally(NamedTuple):
     """Of the nodes of a cluster counted so far."""
 

@@ -13,8 +13,9 @@ from gymnasium.vector.utils import batch_space
 
 from wsn_env.compiled import draws
 from wsn_env.envs.actions import ActionName
+from wsn_env.envs.info import outcomes_by_name
 from wsn_env.envs.interface import Interface, Settings, check_options, scenario_of
-from wsn_env.envs.observations import ObservationName
+from wsn_env.envs.observations import Follower, ObservationName
 from wsn_env.envs.one_thread import Busy, one_thread
 from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera, RenderMode
 from wsn_env.envs.rewards import RewardName
@@ -25,7 +26,7 @@ from wsn_env.models.state import State
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.quantities import Quantities
 from wsn_env.simulation.lifetime import lifetimes
-from wsn_env.simulation.reference import Reference, has_reference
+from wsn_env.simulation.reference import Reference, has_reference, why_no_reference
 from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World
 
@@ -83,9 +84,9 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self._generators: list[np.random.Generator | None] = [None] * self.num_envs
         self._busy = Busy()
         self._state: State = None  # type: ignore[assignment]  # until the first reset
+        self._follower: Follower = None  # type: ignore[assignment]  # of the state, for the observation
         self._view: View = None  # type: ignore[assignment]  # shares the state's arrays
         self._shown: View | None = None  # the period's for others, once they have asked
-        self._last: Any = None  # observation
         self._squares = np.zeros(self.num_envs)
         self._detections = np.zeros(self.num_envs, dtype=np.int64)
         self._ended = np.zeros(self.num_envs, dtype=bool)
@@ -109,6 +110,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
                 self._generators[i] = seeding.np_random(seeds[i])[0]
         if self._state is None:
             self._state = self.world.allocate(self.num_envs)
+            self._follower = self.interface.observation.follow(self._state.knowledge)
         info = self._restart(rows)
         self._show()
         return self._observe(rows), _mask_info(info, rows)
@@ -130,11 +132,11 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         keys = np.zeros(self.num_envs, np.uint64)
         for i in np.flatnonzero(rows):
             keys[i] = draws.episode_key(cast(np.random.Generator, self._generators[i]))
-        self._state, outcome = self.world.restart(self._state, rows, keys, donate=True)
+        outcome = self.world.restart(self._state, rows, keys, donate=True)[1]
         self._squares[rows] = 0.0
         self._detections[rows] = 0
         self._ended = self._ended & ~rows
-        info = self.interface.reward_and_info(outcome.row, self._state.lam)[1]
+        info = self.interface.reward_and_info(outcomes_by_name(outcome.row), self._state.lam)[1]
         if self._reference is not None:
             info["reference_m"] = self._reference.begin(self._state, rows)
         if self._camera is not None:
@@ -153,8 +155,8 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
                 f"rows {np.flatnonzero(anew).tolist()} have ended: reset them with options={{'reset_mask': ...}}"
             )
         cluster = self.interface.action.cluster(_stack_actions(actions), self._view)
-        self._state, outcome = self.world.step(self._state, cluster, donate=True)
-        reward, info = self.interface.reward_and_info(outcome.row, self._state.lam)
+        outcome = self.world.advance(self._state, *cluster)
+        reward, info = self.interface.reward_and_info(outcomes_by_name(outcome.row), self._state.lam)
         self._squares += np.where(self._state.period > self.scenario.unscored, outcome.error_m * outcome.error_m, 0.0)
         self._detections += outcome.detections
         if self._reference is not None:
@@ -189,7 +191,6 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             info["reward_rest"] = self._charge_rest(0.0, rows)[1]
         if self._reference is not None:
             info["episode_reference_m"] = self._reference.episode_m()
-            info["episode_reference_all_awake_m"] = self._reference.all_awake_m(self._state, rows)
         return info
 
     def _charge_rest(self, reward: Any, rows: np.ndarray) -> tuple[Any, np.ndarray]:
@@ -242,6 +243,20 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         return self._shown
 
     @one_thread
+    def reference_all_awake_m(self) -> np.ndarray:
+        """(B,) `episode_reference_m` of the present episodes, had every node been awake throughout and every report
+        arrived. Looks at every node in range in every period: for the end of an episode, before the next begins.
+
+        Raises:
+            ValueError: for a scenario without a reference.
+        """
+        if self._state is None:
+            raise gym.error.ResetNeeded("call reset() first")
+        if self._reference is None:
+            raise ValueError(why_no_reference(self.scenario))
+        return self._reference.all_awake_m(self._state)
+
+    @one_thread
     def action_masks(self) -> np.ndarray:
         """(B, n) bool: which entries of each row's action make sense now."""
         if self._state is None:
@@ -267,12 +282,8 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
 
     def _observe(self, rows: np.ndarray | None = None) -> Any:
         """The observation of all rows, of which only `rows` have changed since the last."""
-        before, self._view, self._shown = self._view, View(self._state.knowledge), None
-        if rows is None or before is None or rows.all():
-            observation = self.interface.observation.encode(self._view)
-        else:
-            observation = self.interface.observation.renew(self._view, rows, before, self._last)
-        self._last = observation.copy()  # whoever gets it may write into it
+        self._view, observation = self._follower(rows)
+        self._shown = None
         return observation
 
 

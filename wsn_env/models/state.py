@@ -226,7 +226,7 @@ class Cluster(NamedTuple):
         rows, nodes = np.nonzero(chosen)
         slots = np.cumsum(chosen, axis=1)[rows, nodes] - 1
         members[rows, slots] = nodes
-        return cls(whole_nodes("head", head).astype(np.int64, copy=False), members)
+        return cls(whole_nodes("head", head).astype(np.int64), members)
 
     def check(self, rows: int) -> tuple[np.ndarray, np.ndarray]:
         """Head and members as arrays of integers.
@@ -271,20 +271,21 @@ OUTCOME = record(
     [
         ("error_m", "f8"),  # distance between the estimate and the target after the correction
         ("energy_mj", "f8"),
-        ("energy_j", "f8", len(PURPOSES)),  # by purpose
         ("members", "i8"),  # awake nodes, head included; all that woke in a search
         ("detections", "i8"),  # awake nodes that detected; of binary sensors, those that had a state to report
         ("delivered", "i8"),  # reports the head had, its own included
         ("dropped", "i8"),  # chosen nodes that were dead, named twice, unknown, or beyond one hop of the head
         ("handover", "?"),  # the head's role went to another node
         ("searched", "?"),
-        ("resampled", "?"),
         ("n_eff", "f8"),
         ("posterior_rms_m", "f8"),  # sqrt(trace of the belief's position covariance)
         ("believed_error_m", "f8"),  # the error that the belief expects
         ("alive", "i8"),  # living nodes after the period
         ("target_m", "f8", 2),  # the truth
         ("estimate_m", "f8", 2),
+        # An environment's info ends here.
+        ("energy_j", "f8", len(PURPOSES)),  # by purpose
+        ("resampled", "?"),
     ]
 )
 

@@ -77,6 +77,7 @@ def _common_constants(scenario):
         "radius_m": scenario.radius_m,
         "period_s": scenario.period_s,
         "periods": float(scenario.periods),
+        "typical_error_m": scenario.typical_error_m,
         "typical_energy_mj": scenario.typical_energy_mj,
         "neighbourhood_m": neighbourhood_m(scenario),
     }

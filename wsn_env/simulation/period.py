@@ -22,17 +22,19 @@ from wsn_env.simulation.sensing import memory_of, send_late, sense, target_of, w
 
 
 @kernel
-def run(start: int, stop: int, cs: Any, handle: np.ndarray, maps: np.ndarray, cluster: Any, results: Any) -> int:
+def run(
+    start: int, stop: int, cs: Any, handle: np.ndarray, maps: np.ndarray, cluster: Any, outcomes: np.ndarray
+) -> int:
     """A period with the particle filter at the head, up to where some rows must search.
 
     Args:
         maps: of the measurement's `residual_maps`.
         cluster: heads (B,) and members (B, M).
-        results: outcomes (B,) OUTCOME; lost (B,) bool, set where a search must follow.
+        outcomes: (B,) OUTCOME; `searched` is set where a search must follow.
 
-    Returns: how many rows are lost.
+    Returns: how many rows must search.
     """
-    (heads, chosen), (outcomes, lost) = cluster, results
+    heads, chosen = cluster
     state, c = state_at(handle), cs[0]
     scratch = make_scratch(state.belief.particles.shape[2])
     count = 0
@@ -45,8 +47,7 @@ def run(start: int, stop: int, cs: Any, handle: np.ndarray, maps: np.ndarray, cl
             redraw_row(key, period, state.belief, b)
         head = AtHead(state.belief, state.network, state.reports, b)
         resampled = filter_row(key, period, head, c, maps, scratch)
-        lost[b] = _conclude(resampled, episode, c.radio, c.tracking)
-        count += lost[b]
+        count += _conclude(resampled, episode, c.radio, c.tracking)
         predict_reports(c.measurement, state.belief, state.network.positions[b], b, c, maps, scratch.weights)
     return count
 
@@ -74,14 +75,11 @@ def sense_and_report(
 
 
 @lean_kernel
-def conclude(
-    start: int, stop: int, cs: Any, resampled: np.ndarray, lost: np.ndarray, outcomes: np.ndarray, handle: np.ndarray
-) -> int:
+def conclude(start: int, stop: int, cs: Any, resampled: np.ndarray, outcomes: np.ndarray, handle: np.ndarray) -> int:
     """What comes after it; returns how many rows must search."""
     state, count = state_at(handle), 0
     for b in range(start, stop):
-        lost[b] = _conclude(resampled[b], Episode(state, b, outcomes[b]), cs[0].radio, cs[0].tracking)
-        count += lost[b]
+        count += _conclude(resampled[b], Episode(state, b, outcomes[b]), cs[0].radio, cs[0].tracking)
     return count
 
 
@@ -212,16 +210,16 @@ def _remember_miss(state, b, c):
 @lean_piece
 def _conclude(resampled, episode, r, t):
     """After the correction: the broadcast, and the end of the period unless a search must come first; returns
-    whether it must."""
+    whether it must, as the outcome's `searched` does."""
     state, b, out = episode
     if resampled and state.network.row[b].head >= 0:
         out.resampled = True
         if r.to_head:
             messages.broadcast(episode, r)
-    lost = _is_lost(state, b, t)
-    if not lost:
+    out.searched = _is_lost(state, b, t)
+    if not out.searched:
         _settle(episode, r, t)
-    return lost
+    return out.searched
 
 
 @lean_piece

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wsn_env.compiled import kernels
+from wsn_env.compiled.arrays import blank
 from wsn_env.compiled.kernels import available_threads, over_rows, threads_for
 from wsn_env.filters import make_tracker
 from wsn_env.filters.particle import ParticleTracker
@@ -120,23 +121,35 @@ class World:
         if not isinstance(cluster, Cluster):
             check_argument("cluster", cluster, Cluster)
         state = state if donate else state.copy()
+        return state, self.advance(state, *_choice(cluster, state))
+
+    def advance(self, state: State, heads: np.ndarray, members: np.ndarray) -> Outcome:
+        """`step` in place, for choices that need no check: what actions make.
+
+        Args:
+            state: where the rows stand, afterwards where they stand then.
+            heads: (B,) int64, and
+            members: (B, M) int32, both not read-only.
+        """
         outcome = _nothing_yet(state)
-        heads, members = _choice(cluster, state)
-        lost = np.zeros(state.rows, bool)
+        heads, members = np.ascontiguousarray(heads), np.ascontiguousarray(members)
+        if members.shape[1] > LONG_LIST:  # kernels sort short lists
+            members = np.sort(members, axis=1)
         # Handover and invitations; the target moves; members sense and report; the head predicts and corrects;
         # broadcast, costs, and the prediction for the next period, unless a row must search first.
         if isinstance(self.tracker, ParticleTracker):  # all in one compiled call
-            arguments = self._constants, state.handle, self.tracker.maps, (heads, members), (outcome.row, lost)
-            n_lost = over_rows(self._run, state.rows, self.threads, *arguments)
+            arguments = self._constants, state.handle, self.tracker.maps, (heads, members), outcome.row
+            searches = over_rows(self._run, len(heads), self.threads, *arguments)
         else:
             self._over_rows(period.sense_and_report, heads, members, outcome.row, state.handle)
             resampled = np.zeros(state.rows, bool)
             self.tracker.correct(state.key, state.period.copy(), state.belief, state.network, state.reports, resampled)
-            n_lost = self._over_rows(period.conclude, resampled, lost, outcome.row, state.handle)
-        if n_lost:
+            searches = self._over_rows(period.conclude, resampled, outcome.row, state.handle)
+        if searches:
+            lost = outcome.searched.copy()
             self._search(lost, state, outcome)
             self._in_rows(lost, period.settle, outcome.row, state.handle)
-        return state, outcome
+        return outcome
 
     def left(self, state: State) -> np.ndarray:
         """(B,) bool: the episode ends in this period, since the target is outside the field (`ends_outside`)."""
@@ -178,19 +191,17 @@ def _keys(keys: npt.ArrayLike) -> np.ndarray:
 
 
 def _nothing_yet(state: State) -> Outcome:
-    return Outcome(np.zeros(state.rows, OUTCOME), state.ledger.spent_j)
+    return Outcome(blank(OUTCOME, state.rows), state.ledger.spent_j)
 
 
 def _choice(cluster: Cluster, state: State) -> tuple[np.ndarray, np.ndarray]:
-    """Heads (B,) and members (B, M) as kernels take them."""
+    """Heads (B,) and members (B, M) as `advance` takes them."""
     heads, members = cluster.check(state.rows)
     nodes = state.network.battery.shape[1]
     if heads.dtype.kind == "u":  # numbers that 63 bits would wrap are no nodes
         heads = np.minimum(heads.astype(np.uint64), np.uint64(nodes))
     if members.dtype != np.int32:  # nor those that 32 bits would
         members = np.where((members < -1) | (members > nodes), nodes, members)
-    if members.shape[1] > LONG_LIST:  # kernels sort short lists
-        members = np.sort(members, axis=1)
-    heads, members = np.ascontiguousarray(heads, np.int64), np.ascontiguousarray(members, np.int32)
+    heads, members = heads.astype(np.int64, copy=False), members.astype(np.int32, copy=False)
     # Kernels are compiled for arrays that may be written to.
     return heads if heads.flags.writeable else heads.copy(), members if members.flags.writeable else members.copy()
