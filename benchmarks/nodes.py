@@ -1,5 +1,5 @@
-"""A step of the single environment costs the same, within a factor of 1.5, from 225 to 1,000,000 nodes: at the same node
-density and in a field of the same size, with a cluster of a head and 3 members.
+"""A step of the single environment costs the same, within a factor of 1.5, from 225 to 1,000,000 nodes: at the same
+node density and in a field of the same size, with a cluster of a head and 3 members.
 
     python -m benchmarks.nodes [--rounds N] [--short] [--json FILE]
 
