@@ -118,15 +118,15 @@ class Training:
     """Parallel fields."""
     rollout: int = 64
     """Periods of each row between two updates."""
-    batch: int = 4096
+    batch: int = 2048
     """Transitions in a minibatch."""
-    epochs: int = 8
+    epochs: int = 4
     """Passes over a rollout."""
     learning_rate: float = 5e-3
     """At the start; falls linearly to 0."""
-    gamma: float = 0.95
+    gamma: float = 0.98
     """Discount per period."""
-    gae_lambda: float = 0.7
+    gae_lambda: float = 0.9
     """Of the generalised advantage estimate."""
     even_worlds: bool | None = None
     """Bring the advantages in each scenario to one size, lest those decide in which costs vary most. Left out: with the

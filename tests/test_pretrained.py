@@ -12,7 +12,7 @@ from wsn_env.evaluation.comparison import evaluate
 
 DOCS = Path(__file__).parents[1] / "docs"
 STEPS = dict.fromkeys(("PreDC-v0", "Rssi-v0"), 12_000_000)
-STEPS |= {"Binary-v0": 4_000_000, "Anchors-v0": 1_500_000, "Underwater-v0": 3_000_000}
+STEPS |= {"Binary-v0": 4_000_000, "Anchors-v0": 2_000_000, "Underwater-v0": 3_000_000}
 STEPS |= {"Ble-v0": 2_000_000, "Lifetime-v0": 6_000_000}
 PAGES = {"Ble-v0": "real_data.md"} | dict.fromkeys(("PreDC-v0", "Rssi-v0"), "learning.md")  # the others': results.md
 EPISODES = 150  # the first of the documented thousand

@@ -32,6 +32,8 @@ def default_worlds(scenario: Scenario) -> list[str]:
     worlds = [f"nodes={nodes_of(scenario, share)}" for share in SHARES]
     if scenario.tracking.switches:
         worlds += [_moving(scenario, **motion) for motion in MOTIONS]
+        if scenario.name in SPEEDS_MS:  # and as slow as motions are where nothing is said
+            worlds += ["motion=turns", "motion=circle"]
     worlds += [noise for factor in (0.5, 2.0) for noise in noises(scenario, factor)]
     worlds += ["packet_success=0.7"]
     if scenario.tracking.switches:

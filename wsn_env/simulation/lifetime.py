@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from wsn_env.compiled.kernels import lean_piece
-from wsn_env.models.state import State
+from wsn_env.compiled.kernels import lean_kernel, lean_piece
+from wsn_env.models.state import State, state_at
 
 METRICS = ("first_death", "half_dead", "functional", "tracked", "stranded_mj", "stranded_sd")
 
@@ -58,9 +58,37 @@ def lifetimes(state: State, periods: int) -> dict[str, np.ndarray]:
         sensing radius; the energy left in all nodes together [mJ], and the standard deviation over the nodes of the
         share of their batteries.
     """
-    life, residual_j = state.life, state.residual_j
+    life = state.life
     found = {name: np.where(life[name] > 0, life[name], periods) for name in METRICS[:3]}
     found["tracked"] = life["tracked"] / np.maximum(state.period, 1)
-    found["stranded_mj"] = 1e3 * residual_j.sum(axis=1)
-    found["stranded_sd"] = (residual_j / state.full_j[:, None]).std(axis=1)
-    return found
+    left_j, sd_j = np.empty((2, state.rows))
+    _take_stock(0, state.rows, state.handle, left_j, sd_j)
+    return found | {"stranded_mj": 1e3 * left_j, "stranded_sd": sd_j / state.full_j}
+
+
+@lean_kernel
+def _take_stock(start: int, stop: int, handle: np.ndarray, left_j: np.ndarray, sd_j: np.ndarray) -> None:
+    """Fill in the sum and the standard deviation of what is left in the nodes of each row."""
+    state = state_at(handle)
+    for b in range(start, stop):
+        residual_j = state.residual_j[b]
+        left_j[b] = _sum_of_powers(residual_j, 0.0, False)
+        mean = left_j[b] / len(residual_j)
+        sd_j[b] = np.sqrt(_sum_of_powers(residual_j, mean, True) / len(residual_j))
+
+
+@lean_piece
+def _sum_of_powers(values, centre, squared):
+    """Of (value - centre), or of its square; in four sums, for a single one would wait for itself."""
+    first, second, third, fourth = 0.0, 0.0, 0.0, 0.0
+    n = len(values) // 4 * 4
+    for i in range(0, n, 4):
+        a, b, c, d = values[i] - centre, values[i + 1] - centre, values[i + 2] - centre, values[i + 3] - centre
+        first += a * a if squared else a
+        second += b * b if squared else b
+        third += c * c if squared else c
+        fourth += d * d if squared else d
+    for i in range(n, len(values)):
+        a = values[i] - centre
+        first += a * a if squared else a
+    return (first + second) + (third + fourth)
