@@ -291,8 +291,8 @@ def test_a_checkpoint_of_other_code_or_settings_is_refused(run, tmp_path, monkey
         patch.setattr(train, "make_scenario", lambda *_: preset.override(**parse_overrides(SET)))
         assert "quantity detection.decay_power = " in resume(tmp_path)
     config = tmp_path / "short" / "config.json"
-    config.write_text(config.read_text().replace('"gamma": 0.95', '"gamma": 0.5'))
-    assert resume(tmp_path, gamma=0.5).startswith(f"{path} was written with setting gamma = 0.95, and now it is 0.5")
+    config.write_text(config.read_text().replace('"gamma": 0.98', '"gamma": 0.5'))
+    assert resume(tmp_path, gamma=0.5).startswith(f"{path} was written with setting gamma = 0.98, and now it is 0.5")
 
 
 def test_a_checkpoint_knows_the_files_beside_an_own_sensor(tmp_path):
