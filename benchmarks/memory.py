@@ -25,6 +25,7 @@ from wsn_env.simulation.world import World
 
 SIZES = ((5000, 225), (500, 225), (5000, 10_000))  # particles, nodes
 ROWS, SHORT_ROWS = 256, 32
+LARGE = ("belief", "track", "residual_j", "ledger", "network", "reports")  # parts with a column of their own
 STEPS = 5
 AT_MOST = 1.5  # times a particle's 24 bytes and a node's 64
 STATUS, CLEAR = Path("/proc/self/status"), Path("/proc/self/clear_refs")
@@ -62,10 +63,11 @@ def measure(options: Options, console: Console) -> Result:
             )
             for name, value in (("arrays", total), ("resident", resident))
         ]
-        cells = [f"{value:,}" for value in (*counted.values(), total)]
+        large = {name: value for name, value in counted.items() if name in LARGE}
+        cells = [f"{value:,}" for value in (*large.values(), total - sum(large.values()), total)]
         lines.append([f"{particles:,}", f"{nodes:,}", *cells, "" if resident is None else f"{resident:,.0f}"])
         result.figures[size] = {"rows": rows, "arrays_bytes": counted, "growth_bytes": grown, "basis_bytes": basis}
-    columns = ["P", "S", *counted, "arrays", "resident"]
+    columns = ["P", "S", *large, "others", "arrays", "resident"]
     result.tables.append(Table("Bytes a row", columns, lines))
     return result
 
