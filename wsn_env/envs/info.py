@@ -6,7 +6,8 @@ import numpy as np
 
 from wsn_env.models.state import OUTCOME
 
-OUTCOME_FIELDS = (OUTCOME.names or ())[:-2]
+NAMES = OUTCOME.names or ()
+OUTCOME_FIELDS = NAMES[: NAMES.index("energy_j")]
 
 
 def outcomes_by_name(outcomes: np.ndarray) -> dict[str, np.ndarray]:

@@ -107,7 +107,8 @@ class Reference:
         Returns: (B,) root of the trace of P's position part [m].
         """
         rows = len(self._memory)
-        reference_m, threads = np.empty(rows), 1 if rows < MANY_ROWS else self._threads
+        reference_m = np.empty(rows)
+        threads = 1 if rows < MANY_ROWS else self._threads
         over_rows(self._advance, rows, threads, self._constants, outcome.row, state.handle, self._memory, reference_m)
         return reference_m
 
