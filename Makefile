@@ -27,7 +27,7 @@ BIG_BATCHES := --epochs 8 --batch 4096
 SHORT_RETURNS := --gamma 0.95 --gae-lambda 0.7
 pretrained-PreDC-v0: STEPS := 12000000
 pretrained-Rssi-v0: STEPS := 12000000
-pretrained-Rssi-v0: MORE := $(SHORT_RETURNS) $(BIG_BATCHES) --no-even-worlds
+pretrained-Rssi-v0: MORE := $(SHORT_RETURNS) $(BIG_BATCHES) --even-worlds False
 pretrained-Binary-v0: STEPS := 4000000
 pretrained-Binary-v0: MORE := --reward error --gae-lambda 0.95 $(BIG_BATCHES)
 pretrained-Anchors-v0: STEPS := 2000000
@@ -35,9 +35,9 @@ pretrained-Anchors-v0: MORE := $(BIG_BATCHES)
 pretrained-Underwater-v0: STEPS := 3000000
 pretrained-Underwater-v0: MORE := $(SHORT_RETURNS) $(BIG_BATCHES)
 pretrained-Ble-v0: STEPS := 2000000
-pretrained-Ble-v0: MORE := $(SHORT_RETURNS) $(BIG_BATCHES) --no-even-worlds --set particles=400
+pretrained-Ble-v0: MORE := $(SHORT_RETURNS) $(BIG_BATCHES) --even-worlds False --set particles=400
 pretrained-Lifetime-v0: STEPS := 6000000
-pretrained-Lifetime-v0: MORE := $(SHORT_RETURNS) $(BIG_BATCHES) --no-even-worlds --set battery_j=0.0005..0.004 \
+pretrained-Lifetime-v0: MORE := $(SHORT_RETURNS) $(BIG_BATCHES) --even-worlds False --set battery_j=0.0005..0.004 \
 	--vary nodes=113 nodes=450 motion=turns motion=walk motion=waypoint,speed_ms=0.5
 pretrained-%: $(READY)
 	$(RUN) train.py --resume --runs out/pretrained --scenario $* --steps $(STEPS) $(MORE) --episodes 0

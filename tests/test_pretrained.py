@@ -1,10 +1,15 @@
 """The policies that come with the package give what the pages say."""
 
 import json
+import shlex
+import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
+import tyro
 
+import train
 from tests.figures import found_blocks
 from wsn_env import Scenario, make_policy
 from wsn_env.agents.ppo import PRETRAINED
@@ -40,6 +45,17 @@ def test_files_are_small_and_tell_how_they_were_made(name):
     saved = json.loads((PRETRAINED / name / "policy.json").read_text())
     assert saved["training"]["seed"] == 0 and saved["training"]["scenario"] == name
     assert saved["training"]["steps"] == STEPS[name]
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+@pytest.mark.parametrize("name", SHIPPED)
+def test_make_trains_them_with_the_settings_that_they_had(name):
+    told = subprocess.run(["make", "-n", f"pretrained-{name}"], cwd=DOCS.parent, capture_output=True, text=True).stdout
+    (line,) = (line for line in told.replace("\\\n", " ").splitlines() if " train.py " in line)
+    settings = tyro.cli(train.Training, args=shlex.split(line.partition(" train.py ")[2]))
+    train.complete_settings(settings)
+    now, then = train.settings_as_json(settings), json.loads((PRETRAINED / name / "policy.json").read_text())
+    assert {setting: now[setting] for setting in then["training"]} == then["training"]
 
 
 @pytest.mark.parametrize(
