@@ -35,7 +35,7 @@ DIFFERENT = {  # name: options of train.py
     "network: flat, 64 x 64": ["--network", "flat", "--units", "64", "64"],
     "network: entries, 32 x 32": ["--units", "32", "32"],
     "critic: sees what the actor sees": ["--privileged", "False"],
-    "GAE lambda: 0.9": ["--gae-lambda", "0.9"],
+    "GAE lambda: 0.7": ["--gae-lambda", "0.7"],
     "learning rate: 0.002": ["--learning-rate", "0.002"],
     "discount: 0.9": ["--gamma", "0.9"],
     "worlds: its own alone": ["--vary"],
