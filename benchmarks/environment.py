@@ -10,15 +10,17 @@ episodes as wsn_env's, and its filters the same posterior.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import gymnasium as gym
 import numpy as np
 from rich.console import Console
 
+from benchmarks.environments.naive import NaiveEnv
 from benchmarks.filters import Problem, enter
 from benchmarks.filters.agreement import STRICT, check_agreement
 from benchmarks.filters.book import BookFilter
-from benchmarks.naive import NaiveEnv
+from benchmarks.filters.textbook import ParticleFilter
 from benchmarks.race import Claim, Options, Result, Table, Times, figure, interleave, main
 from benchmarks.vector import FIXED, ID
 from wsn_env.models.quantity import ScenarioError
@@ -42,13 +44,8 @@ LABELS = {
 def measure(options: Options, console: Console) -> Result:
     """Check, then race."""
     agreement, _ = check_agreement(["NumPy f64, textbook", "filterpy's book"], "position", options.short)
-    differences = episode_differences(*((8, 32, 500) if options.short else (24, 96, 1000)))
-    if max(map(abs, differences.values())) > STANDARD_ERRORS:
-        raise SystemExit(f"the naive environment has other episodes: {differences} standard errors")
-    console.print(
-        f"Episodes: RMS error differs by {differences['rms_m']:+.1f} standard errors,"
-        f" energy by {differences['energy_mj']:+.1f}"
-    )
+    theirs = naive_episodes(*((8, 500) if options.short else (24, 1000)))
+    differences = check_episodes("the naive environment", theirs, console)
     field, skipped = implementations()
     times = interleave(
         {name: call for name, (call, _) in field.items()}, options, {name: steps for name, (_, steps) in field.items()}
@@ -128,23 +125,39 @@ def _step_naive(env: NaiveEnv) -> None:
 # --- do both environments have the same episodes? -----------------------------------------------------------
 
 
-def episode_differences(naive_episodes: int = 24, rows: int = 96, particles: int = 1000) -> dict[str, float]:
-    """Naive minus wsn_env, in standard errors: mean over episodes of the RMS error and of the energy a period.
+@dataclass(frozen=True)
+class Episodes:
+    """What is compared of some, without search, which others do not know."""
 
-    Without search, which the naive environment does not know.
+    rms_m: np.ndarray  # (n,) RMS error
+    energy_mj: np.ndarray  # (n,) energy a period
+    particles: int
+
+
+def check_episodes(whose: str, theirs: Episodes, console: Console) -> dict[str, float]:
+    """Theirs minus wsn_env's, in standard errors: mean over episodes of the RMS error and of the energy a period.
+
+    Raises:
+        SystemExit: if they are too many.
     """
-    overrides = dict(particles=particles, search=False)
-    ours = _vector_episodes(rows, overrides)
-    theirs = _naive_episodes(naive_episodes, overrides)
+    ours = vector_episodes(4 * len(theirs.rms_m), theirs.particles)
     differences = {}
-    for name in ours:
-        error = (ours[name].var(ddof=1) / rows + theirs[name].var(ddof=1) / naive_episodes) ** 0.5
-        differences[name] = float((theirs[name].mean() - ours[name].mean()) / error)
+    for name in ("rms_m", "energy_mj"):
+        a, b = getattr(ours, name), getattr(theirs, name)
+        differences[name] = float((b.mean() - a.mean()) / (a.var(ddof=1) / len(a) + b.var(ddof=1) / len(b)) ** 0.5)
+    if max(map(abs, differences.values())) > STANDARD_ERRORS:
+        raise SystemExit(f"{whose} has other episodes: {differences} standard errors")
+    console.print(
+        f"Episodes of {whose}: RMS error differs by {differences['rms_m']:+.1f} standard errors,"
+        f" energy by {differences['energy_mj']:+.1f}"
+    )
     return differences
 
 
-def _vector_episodes(rows: int, overrides: dict) -> dict[str, np.ndarray]:
-    envs = gym.make_vec(ID, num_envs=rows, vectorization_mode="vector_entry_point", threads=1, **FIXED, **overrides)
+def vector_episodes(rows: int, particles: int) -> Episodes:
+    """Of the native batch."""
+    settings = FIXED | dict(particles=particles, search=False)
+    envs = gym.make_vec(ID, num_envs=rows, vectorization_mode="vector_entry_point", threads=1, **settings)
     envs.reset(seed=0)
     energy = np.zeros(rows)
     truncated = np.zeros(rows, bool)
@@ -153,11 +166,12 @@ def _vector_episodes(rows: int, overrides: dict) -> dict[str, np.ndarray]:
         _, _, _, truncated, infos = envs.step(np.full(rows, MENU_ENTRY))
         energy += infos["energy_mj"]
         periods += 1
-    return {"rms_m": infos["episode_rms_m"], "energy_mj": energy / periods}
+    return Episodes(infos["episode_rms_m"], energy / periods, particles)
 
 
-def _naive_episodes(episodes: int, overrides: dict) -> dict[str, np.ndarray]:
-    env = NaiveEnv(Scenario.named("PreDC-v0", **overrides))
+def naive_episodes(episodes: int, particles: int, kind: type = ParticleFilter) -> Episodes:
+    """Of the naive environment with this filter."""
+    env = NaiveEnv(Scenario.named(ID, particles=particles), kind=kind)
     rms, energy = np.zeros(episodes), np.zeros(episodes)
     for episode in range(episodes):
         env.reset(seed=episode)
@@ -168,7 +182,7 @@ def _naive_episodes(episodes: int, overrides: dict) -> dict[str, np.ndarray]:
             infos.append(info)
         rms[episode] = np.mean([info["error_m"] ** 2 for info in infos]) ** 0.5
         energy[episode] = np.mean([info["energy_mj"] for info in infos])
-    return {"rms_m": rms, "energy_mj": energy}
+    return Episodes(rms, energy, particles)
 
 
 if __name__ == "__main__":

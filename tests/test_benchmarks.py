@@ -116,9 +116,15 @@ def test_the_protocol_is_abstract():
 
 
 def test_the_naive_environment_has_the_same_episodes():
-    differences = environment.episode_differences(8, 48, particles=300)
+    differences = environment.check_episodes("naive", environment.naive_episodes(8, 300), Console(quiet=True))
     assert set(differences) == {"rms_m", "energy_mj"}
     assert all(abs(value) < 3.0 for value in differences.values()), differences
+
+
+def test_other_episodes_stop_the_race():
+    other = environment.Episodes(np.full(4, 9.0) + np.arange(4), np.ones(4), particles=50)
+    with pytest.raises(SystemExit, match="mine has other episodes"):
+        environment.check_episodes("mine", other, Console(quiet=True))
 
 
 def test_every_environment_steps():

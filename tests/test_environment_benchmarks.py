@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from benchmarks import frames, memory, nodes, overhead, recording, training, vector
+from benchmarks import episodes, frames, many_rows, memory, nodes, overhead, recording, training, vector, whole_training
 from benchmarks.race import Options
 from benchmarks.stopwatch import Stopwatch
 from wsn_env.models.state import State
@@ -104,6 +104,27 @@ def test_training():
     one = result.figures["runs"][0]
     assert one["steps"] >= 3 * 32 * 16
     assert sum(one[part] for part in training.PARTS) == pytest.approx(100)
+
+
+def test_episodes():
+    result = whole(episodes.measure(GLANCE, QUIET), 2)
+    assert len(result.tables[0].rows) == 2 * 7
+
+
+def test_many_rows(monkeypatch):
+    monkeypatch.setattr(many_rows, "SHORT_SIZES", (2, 16))
+    result = whole(many_rows.measure(GLANCE, QUIET), 3)
+    assert [row[0] for row in result.tables[0].rows] == ["2", "16"]
+
+
+def test_whole_training(monkeypatch):
+    monkeypatch.setattr(whole_training, "COMPARED", {"episodes": 6, "particles": 200})
+    monkeypatch.setattr(whole_training, "ROWS", 16)
+    monkeypatch.setattr(whole_training, "SHORT_ROLLOUT", 32)
+    result = whole(whole_training.measure(GLANCE, QUIET), 0)
+    raced = [row[0] for row in result.tables[0].rows]
+    assert {whole_training.NATIVE, whole_training.TEXTBOOK} <= set(raced)
+    assert len(raced) + len(result.skipped) == 4
 
 
 def test_a_stopwatch_counts_inside_only():

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from studies import ablations, faults, lifetime, seeds, tables, worlds
+from studies import ablations, faults, lifetime, particles, seeds, tables, worlds
 from studies.report import draw_curves, learning_curve, over_seeds, table
 from tests.figures import check_tables
 from wsn_env import Scenario
@@ -160,3 +160,9 @@ def test_every_fault_is_played_at_three_strengths(tmp_path, monkeypatch):
     assert len(rows) == 3 and all("+0.0 % (+0.0 to +0.0)" in row for row in rows)  # the same policy
     costs = (tmp_path / "out" / "policies.md").read_text().splitlines()
     assert len(costs) == 2 + 1 + 6 + 1 and costs[-1].startswith("| mean rank over the faults |")
+
+
+def test_particles(tmp_path, capsys):
+    assert particles.main(["--episodes", "40", "--out", str(tmp_path)]) == 0
+    assert (tmp_path / "particles.md").read_text().strip() in capsys.readouterr().out
+    check_tables("environment.md", "particles", tmp_path, share=40 / 500)

@@ -8,7 +8,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from gymnasium import spaces
 
-from wsn_env.compiled.kernels import Pinned, kernel, lean_piece
+from wsn_env.compiled.kernels import Pinned, kernel, lean_piece, over_rows, threads_for_short
 from wsn_env.envs.expectations import PLACES, REPORTS, Expectations, outlook_of
 from wsn_env.envs.merit import KEEP, ORDERS, RANKED, rank_row
 from wsn_env.models.measurement.base import Order
@@ -44,14 +44,14 @@ class MenuAction:
     node nearest to a point 0.3 sensing radii ahead of the prediction; each with the n best further members, n = 0..8.
     Without a living head, keeping it means moving it to the best."""
 
-    def __init__(self, scenario: Scenario, order: Order, candidates: int) -> None:
+    def __init__(self, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> None:
         if candidates <= MENU_MEMBERS:
             raise ValueError(f"candidates = {candidates}: the menu must have at least {MENU_MEMBERS + 1}")
         self.space: spaces.Discrete = spaces.Discrete(MENU_ENTRIES)
         self._by, self._candidates, self._ring_m = ORDERS.index(order), candidates, scenario.ring_m
         self._depth = PLACES if order == "nearest" else REPORTS
-        self._expectations, self._constants = Expectations(scenario, candidates), common_constants(scenario)
-        self._read = Pinned(_read_menu)
+        self._expectations, self._constants = Expectations(scenario, candidates, threads), common_constants(scenario)
+        self._read, self._threads = Pinned(_read_menu), threads
 
     def cluster(self, action: Any, view: View) -> Cluster:
         """The cluster that the menu's entries name."""
@@ -60,7 +60,8 @@ class MenuAction:
         choices = self._by, np.ascontiguousarray(_whole_numbers(action, self.space, rows), np.int64)
         found = self._candidates, self._expectations.of(view, self._depth).table
         cluster = Cluster(np.empty(rows, np.int64), np.empty((rows, GROUP), np.int32))
-        if self._read.call(0, rows, self._constants, known.handle, choices, found, cluster[:]):
+        threads = threads_for_short(rows, self._threads)
+        if over_rows(self._read, rows, threads, self._constants, known.handle, choices, found, cluster[:]):
             raise _refusal(action, self.space)
         return cluster
 
@@ -121,7 +122,7 @@ def _read_entry(b, c, known, choices, found, ranking, cluster):
 class SubsetAction:
     """MultiDiscrete [K + 1] + [2] * K: the head (0: keep it, j: the j-th nearest); which of the K nearest are in."""
 
-    def __init__(self, scenario: Scenario, order: Order, candidates: int) -> None:
+    def __init__(self, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> None:
         self.space: spaces.MultiDiscrete = spaces.MultiDiscrete([candidates + 1] + [2] * candidates)
         self._candidates, self._ring_m = candidates, scenario.ring_m
 
@@ -147,7 +148,7 @@ class RadiusAction:
 
     NEAR = 0.8
 
-    def __init__(self, scenario: Scenario, order: Order, candidates: int) -> None:
+    def __init__(self, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> None:
         self.space: spaces.Box = spaces.Box(0.0, 1.0, (1,), np.float32)
         self._candidates, self._radius_m = candidates, scenario.radius_m
 
@@ -169,7 +170,7 @@ class RadiusAction:
 class ScoresAction:
     """Box(K) in [-1, 1]: of the K nearest candidates those above 0 are members and the highest is the head."""
 
-    def __init__(self, scenario: Scenario, order: Order, candidates: int) -> None:
+    def __init__(self, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> None:
         self.space: spaces.Box = spaces.Box(-1.0, 1.0, (candidates,), np.float32)
         self._candidates, self._ring_m = candidates, scenario.ring_m
 
@@ -189,7 +190,7 @@ class NodesAction:
     """MultiDiscrete([2] * S): who is awake. The head is the chosen node nearest to the prediction; if none is chosen,
     the living node nearest to it, alone."""
 
-    def __init__(self, scenario: Scenario, order: Order, candidates: int) -> None:
+    def __init__(self, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> None:
         self.space: spaces.MultiDiscrete = spaces.MultiDiscrete([2] * scenario.field.nodes)
 
     def cluster(self, action: Any, view: View) -> Cluster:
@@ -208,7 +209,7 @@ class NodesAction:
 class ClusterAction:
     """Dict(head: Discrete(S), members: MultiDiscrete([2] * S)): the full choice."""
 
-    def __init__(self, scenario: Scenario, order: Order, candidates: int) -> None:
+    def __init__(self, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> None:
         nodes = scenario.field.nodes
         self.space: spaces.Dict = spaces.Dict(
             {"head": spaces.Discrete(nodes), "members": spaces.MultiDiscrete([2] * nodes)}
@@ -277,8 +278,8 @@ ACTIONS: dict[str, Any] = {
 }
 
 
-def make_action(name: ActionName, scenario: Scenario, order: Order, candidates: int) -> Action:
-    """An action by name.
+def make_action(name: ActionName, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> Action:
+    """An action by name, that shares a large batch among so many threads.
 
     Raises:
         ValueError: for an unknown name or order, or too few candidates.
@@ -287,4 +288,4 @@ def make_action(name: ActionName, scenario: Scenario, order: Order, candidates: 
         raise ValueError(f"action {name!r} is unknown: {suggest(name, ACTIONS)}")
     if order not in ORDERS:
         raise ValueError(f"order {order!r} is unknown: {suggest(order, ORDERS)}")
-    return ACTIONS[name](scenario, order, candidates)
+    return ACTIONS[name](scenario, order, candidates, threads)

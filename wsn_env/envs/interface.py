@@ -57,7 +57,7 @@ class Interface:
     """The three translations of an environment, bound to a scenario."""
 
     def __init__(self, scenario: Scenario, settings: Settings, threads: int = 1) -> None:
-        self.action: Action = make_action(settings.action, scenario, settings.order, settings.candidates)
+        self.action: Action = make_action(settings.action, scenario, settings.order, settings.candidates, threads)
         self.observation: Observation = make_observation(
             settings.observation, scenario, settings.order, settings.candidates, threads
         )

@@ -19,7 +19,7 @@ Both are made of the truth: for loggers and tables, never for policies.
 import numpy as np
 
 from wsn_env.compiled.arrays import record
-from wsn_env.compiled.kernels import Pinned, lean_kernel, lean_piece, over_rows, threads_for
+from wsn_env.compiled.kernels import Pinned, lean_kernel, lean_piece, over_rows, threads_for, threads_for_short
 from wsn_env.models.detection.base import detects, stream_of
 from wsn_env.models.measurement.base import node_at, value_information
 from wsn_env.models.motion.prediction import predict_covariance
@@ -28,8 +28,6 @@ from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import constants
 from wsn_env.simulation.episode import start_record
 from wsn_env.simulation.geometry import cells_within
-
-MANY_ROWS = 512  # from here on the short work of a period is shared among threads
 
 MEMORY = record(
     [
@@ -108,7 +106,7 @@ class Reference:
         """
         rows = len(self._memory)
         reference_m = np.empty(rows)
-        threads = 1 if rows < MANY_ROWS else self._threads
+        threads = threads_for_short(rows, self._threads)
         over_rows(self._advance, rows, threads, self._constants, outcome.row, state.handle, self._memory, reference_m)
         return reference_m
 
