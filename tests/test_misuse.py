@@ -195,6 +195,8 @@ def doors(where, dataset):
         "Evaluation.best_of": door(evaluation.best_of, stem="nearest", lam=1.0),
         "Evaluation.save": door(evaluation.save, out=where / "out"),
         "error_bound": door(error_bound, policy="nearest1", scenario=BOUNDED, episodes=2),
+        "register": door(wsn_env.register, id="Misused-v0"),
+        "as_policy": door(wsn_env.as_policy, model=lambda observations: np.zeros(len(observations), int)),
         "score": door(score, act=lambda given: np.ones(2, int), envs=envs),
         "lam_sweep": door(lam_sweep, scenario=TINY),
         "replay": door(replay, policies={"a": policy}, scenario=TINY, seed=2, out=where / "page.html"),

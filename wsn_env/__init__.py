@@ -12,7 +12,9 @@ from wsn_env.envs.registration import register_envs
 
 if TYPE_CHECKING:
     from wsn_env.envs.env import ClusterEnv as ClusterEnv
+    from wsn_env.envs.registration import register as register
     from wsn_env.envs.vector_env import ClusterVectorEnv as ClusterVectorEnv
+    from wsn_env.evaluation.as_policy import as_policy as as_policy
     from wsn_env.evaluation.bound import error_bound as error_bound
     from wsn_env.evaluation.comparison import evaluate as evaluate
     from wsn_env.evaluation.policies import make_policy as make_policy
@@ -38,9 +40,11 @@ _HOMES = {
     "ClusterEnv": "wsn_env.envs.env",
     "ClusterVectorEnv": "wsn_env.envs.vector_env",
     "evaluate": "wsn_env.evaluation.comparison",
+    "as_policy": "wsn_env.evaluation.as_policy",
     "error_bound": "wsn_env.evaluation.bound",
     "score": "wsn_env.evaluation.scoring",
     "make_policy": "wsn_env.evaluation.policies",
+    "register": "wsn_env.envs.registration",
     "register_envs": "wsn_env.envs.registration",
 }
 __all__ = ["__version__", *_HOMES]

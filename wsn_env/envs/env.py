@@ -7,6 +7,7 @@ from typing import Any, Unpack
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 
 from wsn_env.compiled import draws
 from wsn_env.envs.actions import ActionName
@@ -16,16 +17,17 @@ from wsn_env.envs.observations import Follower, ObservationName
 from wsn_env.envs.one_thread import Busy, one_thread
 from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera, RenderMode
 from wsn_env.envs.rewards import RewardName
+from wsn_env.envs.spec import told_spec
 from wsn_env.models.arguments import checked_but
 from wsn_env.models.measurement.base import Order
 from wsn_env.models.quantity import whole_number
-from wsn_env.models.state import State
+from wsn_env.models.state import Cluster, State
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.quantities import Quantities
 from wsn_env.simulation.lifetime import lifetimes
 from wsn_env.simulation.reference import Reference, has_reference, why_no_reference
 from wsn_env.simulation.view import View
-from wsn_env.simulation.world import World
+from wsn_env.simulation.world import World, choice_of
 
 
 class ClusterEnv(gym.Env):
@@ -42,6 +44,7 @@ class ClusterEnv(gym.Env):
         render_mode: None | "rgb_array" | "human", a window, for which pygame-ce must be installed.
         frame_px: side of a frame.
         fast: a quicker particle filter, equal to rounding, whose bits differ from processor to processor.
+        action_mask: every info also has `action_mask`, int8: what `action_masks()` gives.
         overrides: any quantity of the scenario: `nodes=400, particles=1000, lam=(0.3, 30), motion="sine"`.
 
     An episode is truncated at the horizon: a lost track or a dead network goes on. It terminates only with
@@ -49,6 +52,7 @@ class ClusterEnv(gym.Env):
     """
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": FPS}
+    _spec: EnvSpec | None = None
 
     @checked_but("candidates", "frame_px")
     def __init__(  # noqa: PLR0913
@@ -62,11 +66,13 @@ class ClusterEnv(gym.Env):
         render_mode: RenderMode | None = None,
         frame_px: int = 600,
         fast: bool = False,
+        action_mask: bool = False,
         **overrides: Unpack[Quantities],
     ) -> None:
         self.scenario: Scenario = scenario_of(scenario, overrides, type(self))
         self._camera = None if render_mode is None else Camera(self.scenario, render_mode, frame_px)
         self.interface: Interface = Interface(self.scenario, Settings(action, observation, reward, order, candidates))
+        self._tells_mask: bool = action_mask and self.interface.check_masks(action)
         self.world: World = World(self.scenario, threads=1, fast=fast)
         self.render_mode: RenderMode | None = render_mode
         self.action_space: gym.Space[Any] = self.interface.action.space
@@ -80,7 +86,7 @@ class ClusterEnv(gym.Env):
         self._view: View = None  # type: ignore[assignment]  # shares the state's arrays
         self._shown: View | None = None  # the period's for others, once they have asked
         self._lam, self._period, self._ended = 0.0, 0, False
-        self._squares = 0.0
+        self._squares = self._energy_mj = 0.0
         self._detections = 0
         self._reference = Reference(self.scenario) if has_reference(self.scenario) else None
 
@@ -95,7 +101,7 @@ class ClusterEnv(gym.Env):
         if self._state is None:
             self._state, self._follower = state, self.interface.observation.follow(state.knowledge)
         self._lam, self._period, self._ended = self._state.lam.item(), 0, False
-        self._squares = 0.0
+        self._squares = self._energy_mj = 0.0
         self._detections = 0
         info = self.interface.reward_and_info(outcome_by_name(outcome.row), self._lam)[1]
         if self._reference is not None:
@@ -103,21 +109,29 @@ class ClusterEnv(gym.Env):
         if self._camera is not None:
             self._camera.begin(self._state, outcome, [True])
             self._camera.show(self._state)
-        return self._observe(), info
+        return self._observe(info), info
 
     @one_thread
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """One period. Returns observation, reward, terminated, truncated, info."""
+        """One period. Returns observation, reward, terminated, truncated, info.
+
+        Args:
+            action: of the action space; or a Cluster, of one row, as policies choose it.
+        """
         if self._state is None:
             raise gym.error.ResetNeeded("call reset() before step()")
         if self._ended:
             raise gym.error.ResetNeeded(f"the episode ended after {self._period} periods: call reset()")
-        cluster = self.interface.action.cluster(_add_batch_axis(action), self._view)
+        if isinstance(action, Cluster):
+            cluster = choice_of(action, self._state)
+        else:
+            cluster = self.interface.action.cluster(_add_batch_axis(action), self._view)
         outcome = self.world.advance(self._state, *cluster)
         reward, info = self.interface.reward_and_info(outcome_by_name(outcome.row), self._lam)
         self._period += 1
         if self._period > self.scenario.unscored:
             self._squares += info["error_m"] * info["error_m"]
+        self._energy_mj += info["energy_mj"]
         self._detections += info["detections"]
         if self._reference is not None:
             info["reference_m"] = self._reference.advance(self._state, outcome).item()
@@ -129,6 +143,7 @@ class ClusterEnv(gym.Env):
         self._ended = terminated or truncated
         if self._ended:
             info["episode_rms_m"] = math.sqrt(self._squares / (self._period - self.scenario.unscored))
+            info["episode_energy_mj"] = self._energy_mj
             info["antnp"] = self._detections / self._period
             info |= {name: values.item() for name, values in lifetimes(self._state, self.scenario.periods).items()}
             if self.scenario.ends_outside:
@@ -136,7 +151,12 @@ class ClusterEnv(gym.Env):
                 reward, info["reward_rest"] = self.interface.charge_rest(reward, self._lam, left)
             if self._reference is not None:
                 info["episode_reference_m"] = self._reference.episode_m().item()
-        return self._observe(), reward, terminated, truncated, info
+        return self._observe(info), reward, terminated, truncated, info
+
+    @property
+    def lam(self) -> np.ndarray:
+        """(1,) the present episode's trade-off [m/mJ]."""
+        return self._state.lam
 
     @property
     @one_thread
@@ -183,9 +203,20 @@ class ClusterEnv(gym.Env):
         if self._camera is not None:
             self._camera.close()
 
-    def _observe(self) -> Any:
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How `gym.make` made it, with the horizon as `max_episode_steps`."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = told_spec(spec, self.scenario.periods)
+
+    def _observe(self, info: dict[str, Any]) -> Any:
         self._view, arrays = self._follower()
         self._shown = None
+        if self._tells_mask:
+            info["action_mask"] = self.interface.action.masks(self._view)[0].astype(np.int8)
         if isinstance(arrays, dict):
             return {name: value[0] if value.ndim > 1 else value.item() for name, value in arrays.items()}
         return arrays[0]

@@ -1,6 +1,6 @@
 """What learners meet: actions (spaces <-> Cluster), observations (View -> arrays), rewards, pictures."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from inspect import signature
 from typing import Any
@@ -12,7 +12,7 @@ from wsn_env.envs.actions import Action, ActionName, make_action
 from wsn_env.envs.observations import Observation, ObservationName, make_observation
 from wsn_env.envs.rewards import RewardName, make_reward, reward_space
 from wsn_env.models.measurement.base import Order
-from wsn_env.models.quantity import UnknownQuantity, short, whole_number
+from wsn_env.models.quantity import UnknownKeyword, UnknownQuantity, short, suggest, whole_number
 from wsn_env.models.state import Cluster
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.view import View
@@ -32,11 +32,11 @@ class Settings:
         object.__setattr__(self, "candidates", whole_number("candidates", self.candidates, 1))
 
 
-def scenario_of(scenario: str | Scenario, overrides: Any, environment: Callable[..., Any]) -> Scenario:
+def scenario_of(scenario: str | Scenario, overrides: Any, environment: type) -> Scenario:
     """The scenario of an environment that was given these keywords beside its own.
 
     Raises:
-        ScenarioError: for an unknown keyword, suggests among the quantities and the environment's own arguments.
+        UnknownKeyword: suggests among the quantities and the environment's own arguments.
     """
     try:
         return Scenario.of(scenario, **overrides)
@@ -44,7 +44,10 @@ def scenario_of(scenario: str | Scenario, overrides: Any, environment: Callable[
         own = [
             each.name for each in signature(environment).parameters.values() if each.kind is each.POSITIONAL_OR_KEYWORD
         ]
-        raise UnknownQuantity(problem.owner, problem.name, [*problem.known, *own]) from None
+        hint = suggest(problem.name, [*problem.known, *own])
+        raise UnknownKeyword(
+            f"{environment.__name__}() got an unexpected keyword argument {problem.name!r}: {hint}"
+        ) from None
 
 
 def check_options(options: Any) -> None:
@@ -65,6 +68,16 @@ class Interface:
         self._reward = make_reward(settings.reward, scenario.counted_m)
         self._counted = scenario.counted_m
         self._reference = scenario.reference_error_m, scenario.reference_energy_mj
+
+    def check_masks(self, name: ActionName) -> bool:
+        """True.
+
+        Raises:
+            ValueError: the action of this name has no masks.
+        """
+        if isinstance(self.action.space, Box):
+            raise ValueError(f"action_mask = True: action {name!r} is of numbers and has no masks")
+        return True
 
     def most_probable(self, logits: np.ndarray, view: View) -> Cluster:
         """The clusters of the most probable actions.

@@ -7,6 +7,7 @@ from typing import Any, Literal, Unpack, cast
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
@@ -19,16 +20,17 @@ from wsn_env.envs.observations import Follower, ObservationName
 from wsn_env.envs.one_thread import Busy, one_thread
 from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera, RenderMode
 from wsn_env.envs.rewards import RewardName
+from wsn_env.envs.spec import told_spec
 from wsn_env.models.arguments import checked_but
 from wsn_env.models.measurement.base import Order
 from wsn_env.models.quantity import whole_number
-from wsn_env.models.state import State
+from wsn_env.models.state import Cluster, State
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.quantities import Quantities
 from wsn_env.simulation.lifetime import lifetimes
 from wsn_env.simulation.reference import Reference, has_reference, why_no_reference
 from wsn_env.simulation.view import View
-from wsn_env.simulation.world import World
+from wsn_env.simulation.world import World, choice_of
 
 
 class ClusterVectorEnv(gym.vector.VectorEnv):
@@ -38,6 +40,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         num_envs: B.
         autoreset_mode: "NextStep" (Gymnasium's default), "SameStep", or "Disabled": then rows are started anew by
             `reset(options={"reset_mask": (B,) bool})`.
+        max_episode_steps: episodes are truncated after so many periods, if that is before the horizon.
         threads: cores to share a large batch; None: all that the process may use. No bit depends on it.
         The rest: as ClusterEnv. A vector reward has the shape (B, 2); `reward_space` and `reward_dim` are of one row.
     """
@@ -48,7 +51,9 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
 
-    @checked_but("num_envs", "candidates", "frame_px", "threads")
+    _spec: EnvSpec | None = None
+
+    @checked_but("num_envs", "candidates", "frame_px", "threads", "max_episode_steps")
     def __init__(  # noqa: PLR0913
         self,
         num_envs: int = 1,
@@ -61,7 +66,9 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         render_mode: RenderMode | None = None,
         frame_px: int = 600,
         fast: bool = False,
+        action_mask: bool = False,
         autoreset_mode: Literal["NextStep", "SameStep", "Disabled"] | AutoresetMode = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | None = None,
         threads: int | None = None,
         **overrides: Unpack[Quantities],
     ) -> None:
@@ -74,6 +81,11 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self.world: World = World(self.scenario, threads, fast)
         settings = Settings(action, observation, reward, order, candidates)
         self.interface: Interface = Interface(self.scenario, settings, self.world.threads)
+        self._tells_mask: bool = action_mask and self.interface.check_masks(action)
+        periods = self.scenario.periods
+        if max_episode_steps is not None:
+            periods = min(periods, whole_number("max_episode_steps", max_episode_steps, 1 + self.scenario.unscored))
+        self._horizon: int = periods
         self.single_action_space: gym.Space[Any] = self.interface.action.space
         self.single_observation_space: gym.Space[Any] = self.interface.observation.space
         self.action_space: gym.Space[Any] = batch_space(self.single_action_space, self.num_envs)
@@ -82,12 +94,14 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             self.reward_space: gym.spaces.Box = self.interface.reward_space
             self.reward_dim: int = 2
         self._generators: list[np.random.Generator | None] = [None] * self.num_envs
+        self._seeds: list[int | None] = [None] * self.num_envs  # that they began with
         self._busy = Busy()
         self._state: State = None  # type: ignore[assignment]  # until the first reset
         self._follower: Follower = None  # type: ignore[assignment]  # of the state, for the observation
         self._view: View = None  # type: ignore[assignment]  # shares the state's arrays
         self._shown: View | None = None  # the period's for others, once they have asked
         self._squares = np.zeros(self.num_envs)
+        self._energy_mj = np.zeros(self.num_envs)
         self._detections = np.zeros(self.num_envs, dtype=np.int64)
         self._ended = np.zeros(self.num_envs, dtype=bool)
         self._reference = None
@@ -107,13 +121,14 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         rows, seeds = self._rows_to_reset(options), row_seeds(seed, self.num_envs)
         for i in np.flatnonzero(rows):
             if seeds[i] is not None or self._generators[i] is None:
-                self._generators[i] = seeding.np_random(seeds[i])[0]
+                self._generators[i], self._seeds[i] = seeding.np_random(seeds[i])
         if self._state is None:
             self._state = self.world.allocate(self.num_envs)
             self._follower = self.interface.observation.follow(self._state.knowledge)
         info = self._restart(rows)
         self._show()
-        return self._observe(rows), _mask_info(info, rows)
+        observation = self._observe(rows)
+        return observation, _mask_info(info, rows) | self._told_masks()
 
     def _rows_to_reset(self, options: dict[str, Any] | None) -> np.ndarray:
         mask = (options or {}).get("reset_mask")
@@ -133,7 +148,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         for i in np.flatnonzero(rows):
             keys[i] = draws.episode_key(cast(np.random.Generator, self._generators[i]))
         outcome = self.world.restart(self._state, rows, keys, donate=True)[1]
-        self._squares[rows] = 0.0
+        self._squares[rows] = self._energy_mj[rows] = 0.0
         self._detections[rows] = 0
         self._ended = self._ended & ~rows
         info = self.interface.reward_and_info(outcomes_by_name(outcome.row), self._state.lam)[1]
@@ -145,7 +160,11 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
 
     @one_thread
     def step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """One period for every row; ended rows start anew as the autoreset mode says."""
+        """One period for every row; ended rows start anew as the autoreset mode says.
+
+        Args:
+            actions: of the action space; or a Cluster of B rows, as policies choose it.
+        """
         if self._state is None:
             raise gym.error.ResetNeeded("call reset() before step()")
         anew = self._ended
@@ -154,10 +173,14 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
             raise gym.error.ResetNeeded(
                 f"rows {np.flatnonzero(anew).tolist()} have ended: reset them with options={{'reset_mask': ...}}"
             )
-        cluster = self.interface.action.cluster(_stack_actions(actions), self._view)
+        if isinstance(actions, Cluster):
+            cluster = choice_of(actions, self._state)
+        else:
+            cluster = self.interface.action.cluster(_stack_actions(actions), self._view)
         outcome = self.world.advance(self._state, *cluster)
         reward, info = self.interface.reward_and_info(outcomes_by_name(outcome.row), self._state.lam)
         self._squares += np.where(self._state.period > self.scenario.unscored, outcome.error_m * outcome.error_m, 0.0)
+        self._energy_mj += outcome.energy_mj
         self._detections += outcome.detections
         if self._reference is not None:
             info["reference_m"] = self._reference.advance(self._state, outcome)
@@ -166,7 +189,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         if begins:  # next-step mode: these rows only begin
             reward[anew] = 0.0
             _overwrite_rows(info, self._restart(anew), anew)
-        truncated = self._state.period >= self.scenario.periods
+        truncated = self._state.period >= self._horizon
         terminated = self.world.left(self._state)
         ended = terminated | truncated
         ends = ended.any()
@@ -179,18 +202,21 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         infos = _mask_info(info)
         if ends:
             infos |= _mask_info(self._episode_info(ended), ended)
-        return self._observe(), reward, terminated, truncated, infos
+        observation = self._observe()
+        return observation, reward, terminated, truncated, infos | self._told_masks()
 
     def _episode_info(self, rows: np.ndarray) -> dict[str, np.ndarray]:
         """What sums up an episode, of the rows that end."""
         played = np.maximum(self._state.period, 1)
         scored = np.maximum(played - self.scenario.unscored, 1)
-        info = {"episode_rms_m": np.sqrt(self._squares / scored), "antnp": self._detections / played}
-        info |= lifetimes(self._state, self.scenario.periods)
+        info = {"episode_rms_m": np.sqrt(self._squares / scored), "episode_energy_mj": self._energy_mj.copy()}
+        info["antnp"] = self._detections / played
+        info |= lifetimes(self._state, self._horizon)
         if self.scenario.ends_outside:
             info["reward_rest"] = self._charge_rest(0.0, rows)[1]
         if self._reference is not None:
-            info["episode_reference_m"] = self._reference.episode_m()
+            share = self._horizon / self.scenario.periods  # that is played
+            info["episode_reference_m"] = self._reference.episode_m() / np.sqrt(share)
         return info
 
     def _charge_rest(self, reward: Any, rows: np.ndarray) -> tuple[Any, np.ndarray]:
@@ -208,12 +234,13 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         for i in np.flatnonzero(ended):
             final[i] = {name: value[i] for name, value in last.items()} if isinstance(last, dict) else last[i]
         infos: dict[str, Any] = {"final_obs": final, "_final_obs": ended.copy()}
-        infos["final_info"] = _mask_info(info | self._episode_info(ended), ended)
+        infos["final_info"] = _mask_info(info | self._episode_info(ended), ended) | self._told_masks()
         infos["_final_info"] = ended.copy()
         _overwrite_rows(info, self._restart(ended), ended)
         self._show()
         infos |= _mask_info(info)
-        return self._observe(ended), reward, terminated, truncated, infos
+        observation = self._observe(ended)
+        return observation, reward, terminated, truncated, infos | self._told_masks()
 
     @one_thread
     def skip_episodes(self, counts: np.ndarray) -> None:
@@ -221,6 +248,25 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         for generator, count in zip(self._generators, counts.tolist()):
             for _ in range(count):
                 draws.episode_key(cast(np.random.Generator, generator))
+
+    @property
+    def np_random_seed(self) -> tuple[int | None, ...]:  # type: ignore[override]
+        """(B,) the seeds that the rows' generators began with; None before the first reset."""
+        return tuple(self._seeds)
+
+    @property
+    def np_random(self) -> tuple[np.random.Generator | None, ...]:  # type: ignore[override,misc]
+        """(B,) the rows' generators; None before the first reset."""
+        return tuple(self._generators)
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How `gym.make_vec` made it, with the horizon as `max_episode_steps`."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = told_spec(spec, self._horizon)
 
     @property
     def lam(self) -> np.ndarray:
@@ -275,6 +321,13 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         """Close the window, if there is one."""
         if self._camera is not None:
             self._camera.close()
+
+    def _told_masks(self) -> dict[str, np.ndarray]:
+        """What infos tell of the actions that make sense now."""
+        if not self._tells_mask:
+            return {}
+        every = np.ones(self.num_envs, bool)
+        return {"action_mask": self.interface.action.masks(self._view).astype(np.int8), "_action_mask": every}
 
     def _show(self) -> None:
         if self._camera is not None:

@@ -83,7 +83,7 @@ def named_policies(texts: str | Iterable[str] | Mapping[str, Policy], scenario: 
 
     Args:
         texts: names, paths of saved policies, "FILE.py:Class", or "label=" and any of these, one or several; or a dict
-            of policies by label.
+            of policies by label. One that has `for_scenario` is asked for the policy.
         scenario: what they will act in.
 
     Raises:
@@ -91,6 +91,9 @@ def named_policies(texts: str | Iterable[str] | Mapping[str, Policy], scenario: 
     """
     if isinstance(texts, Mapping):
         named = dict(texts)
+        for label, given in texts.items():
+            made_for = getattr(given, "for_scenario", None)
+            named[label] = made_for(scenario) if callable(made_for) else given
         for label, policy in named.items():
             if isinstance(policy, type) or not callable(getattr(policy, "act", None)):
                 raise ValueError(f"policies[{label!r}] = {short(repr(policy))}: must be a policy, with act(view)")

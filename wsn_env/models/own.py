@@ -188,6 +188,12 @@ def _is_own(file: str) -> bool:
     return os.path.isfile(path) and not installed and not any(path.is_relative_to(other) for other in ours)
 
 
+def kind_text(kind: type) -> str:
+    """What tells a class: its name; of one from a user's file "FILE.py:CLASS"."""
+    file = getattr(sys.modules.get(kind.__module__), "__file__", None)
+    return f"{file}:{kind.__name__}" if file and kind.__module__.startswith(OF_FILES) else kind.__name__
+
+
 def kind_and_settings(registry: Registry, role: str, text: str) -> tuple[type[Kind], dict[str, Any]]:
     """The kind that a text names, and its settings: "rssi", "rssi,noise_db=2", "mine.py:MyBearing,sd_deg=3"."""
     name, comma, rest = text.partition(",")

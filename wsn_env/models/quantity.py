@@ -30,6 +30,16 @@ class UnknownQuantity(ScenarioError):
         return UnknownQuantity, (self.owner, self.name, self.known)
 
 
+class UnknownKeyword(ScenarioError, TypeError):
+    """An environment has no such argument, and its scenario no such quantity.
+
+    Also a TypeError in Python's words: there are libraries that try arguments, and go by that.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message.partition(" was raised from the environment creator")[0])  # which gym.make adds
+
+
 def quantity(default: Any, meaning: str, **allowed: Any) -> Any:
     """A field with its meaning and what is allowed, in the words of `check_quantity`."""
     return field(default=default, metadata={"meaning": meaning, "allowed": allowed})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache, cached_property
 from importlib import import_module
@@ -20,6 +21,7 @@ from wsn_env.models.measurement.base import Measurement
 from wsn_env.models.measurement.position import Position
 from wsn_env.models.motion.base import Motion
 from wsn_env.models.motion.crossing import Crossing
+from wsn_env.models.own import kind_text
 from wsn_env.models.quantity import (
     ScenarioError,
     Section,
@@ -33,7 +35,7 @@ from wsn_env.models.quantity import (
 from wsn_env.models.radio.base import Link
 from wsn_env.models.radio.radio import Radio
 from wsn_env.models.recordings.calibration_file import read_quantities
-from wsn_env.scenario.named import faults_named, kind_named
+from wsn_env.scenario.named import faults_named, kind_named, section_told
 from wsn_env.scenario.quantities import Quantities
 from wsn_env.scenario.tracking import Tracking
 
@@ -209,8 +211,12 @@ class Scenario(Section):
         return self.radio.handover_bits if self.radio.handover == "estimate" else 5 * 32 * self.tracking.particles
 
     @classmethod
-    def of(cls, scenario: str | Scenario, /, **overrides: Unpack[Quantities]) -> Scenario:
-        """A scenario from a preset's name or from a scenario, with overrides by quantity."""
+    def of(cls, scenario: str | Mapping[str, Any] | Scenario, /, **overrides: Unpack[Quantities]) -> Scenario:
+        """A scenario from a preset's name, from what `as_dict` tells or from a scenario, with overrides by quantity."""
+        if isinstance(scenario, Mapping):
+            if "name" not in scenario:
+                raise ScenarioError(f"scenario = {short(repr(scenario))}: must tell its name, as `as_dict` does")
+            scenario = cls().override(**cast(Any, scenario))
         if not isinstance(scenario, Scenario):
             return cls.named(scenario, **overrides)
         return scenario.override(**overrides) if overrides else scenario
@@ -235,10 +241,10 @@ class Scenario(Section):
     def override(self, **quantities: Unpack[Quantities]) -> Scenario:
         """A copy with some quantities changed, whatever section they stand in.
 
-        Sections are given whole or, where there are several kinds, by name: `override(nodes=400, motion="sine",
-        amplitude_m=20, tracker="ekf")`. So are faults, of which several are joined: `faults="stuck,share=0.3+late"`.
-        An unknown keyword raises and suggests. `calibration=FILE` stands for all quantities that `wsn calibrate` wrote
-        into the file. A replay without `periods` is as long as its recording.
+        Sections are given whole, as `as_dict` tells them or, where there are several kinds, by name:
+        `override(nodes=400, motion="sine", amplitude_m=20, tracker="ekf")`. So are faults, of which several are joined:
+        `faults="stuck,share=0.3+late"`. An unknown keyword raises and suggests. `calibration=FILE` stands for all
+        quantities that `wsn calibrate` wrote into the file. A replay without `periods` is as long as its recording.
         """
         changes: dict[str, Any] = dict(quantities)
         if "calibration" in changes:
@@ -246,6 +252,9 @@ class Scenario(Section):
         if changes.get("positions") is not None:
             changes.setdefault("nodes", Field.nodes)  # the positions tell how many
         whole: dict[str, Any] = {}
+        for name, part in PARTS.items():
+            if isinstance(changes.get(name), Mapping):
+                whole[name] = section_told(name, part, BY_NAME.get(name), changes.pop(name))
         for name, registry in BY_NAME.items():
             if isinstance(changes.get(name), str):
                 whole[name] = kind_named(registry, name, changes.pop(name), changes)
@@ -287,17 +296,17 @@ class Scenario(Section):
         return flat
 
     def as_dict(self) -> dict[str, Any]:
-        """Nested plain values for JSON, with the chosen kind of motion and measurement."""
+        """Nested plain values for JSON, with each section's kind; `Scenario.of` makes a scenario of them."""
         plain: dict[str, Any] = {}
         for item in fields(self):
             value = getattr(self, item.name)
-            plain[item.name] = _plain(value) if is_dataclass(value) else value
-        return plain | {"faults": [_plain(fault) for fault in self.faults]}
+            plain[item.name] = section_as_dict(value) if is_dataclass(value) else value
+        return plain | {"faults": [section_as_dict(fault) for fault in self.faults]}
 
 
-def _plain(section: Any) -> dict[str, Any]:
-    """A section's kind and quantities."""
-    return {"kind": type(section).__name__} | {item.name: getattr(section, item.name) for item in fields(section)}
+def section_as_dict(section: Any) -> dict[str, Any]:
+    """A section's kind and quantities, as `override` takes them."""
+    return {"kind": kind_text(type(section))} | {item.name: getattr(section, item.name) for item in fields(section)}
 
 
 def _words(name: str, part: type) -> str:

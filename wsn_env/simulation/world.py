@@ -121,7 +121,7 @@ class World:
         if not isinstance(cluster, Cluster):
             check_argument("cluster", cluster, Cluster)
         state = state if donate else state.copy()
-        return state, self.advance(state, *_choice(cluster, state))
+        return state, self.advance(state, *choice_of(cluster, state))
 
     def advance(self, state: State, heads: np.ndarray, members: np.ndarray) -> Outcome:
         """`step` in place, for choices that need no check: what actions make.
@@ -194,8 +194,12 @@ def _nothing_yet(state: State) -> Outcome:
     return Outcome(blank(OUTCOME, state.rows), state.ledger.spent_j)
 
 
-def _choice(cluster: Cluster, state: State) -> tuple[np.ndarray, np.ndarray]:
-    """Heads (B,) and members (B, M) as `advance` takes them."""
+def choice_of(cluster: Cluster, state: State) -> tuple[np.ndarray, np.ndarray]:
+    """Heads (B,) and members (B, M) as `advance` takes them.
+
+    Raises:
+        ValueError: what is no whole number, or not one row for each of the state's.
+    """
     heads, members = cluster.check(state.rows)
     nodes = state.network.battery.shape[1]
     if heads.dtype.kind == "u":  # numbers that 63 bits would wrap are no nodes

@@ -1,0 +1,43 @@
+"""What an environment tells of how it was made: Gymnasium's spec, with the horizon, in values that JSON can hold."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from os import PathLike, fspath
+from typing import Any
+
+import numpy as np
+from gymnasium.envs.registration import EnvSpec
+
+from wsn_env.models.quantity import Section
+from wsn_env.scenario.scenario import Scenario, section_as_dict
+
+
+def told_spec(spec: EnvSpec | None, horizon: int) -> EnvSpec | None:
+    """As `gym.make` has set it, with `max_episode_steps`, so that tools which look for the horizon there find it.
+
+    Args:
+        horizon: periods of an episode.
+    """
+    if spec is None:
+        return None
+    told = copy.copy(spec)
+    told.max_episode_steps = horizon
+    told.kwargs = {name: _plain(value) for name, value in spec.kwargs.items()}
+    return told
+
+
+def _plain(value: Any) -> Any:
+    """As JSON gives it back."""
+    if isinstance(value, Scenario):
+        return _plain(value.as_dict())
+    if isinstance(value, Section):
+        return _plain(section_as_dict(value))
+    if isinstance(value, Mapping):
+        return {name: _plain(each) for name, each in value.items()}
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    if isinstance(value, PathLike):
+        return fspath(value)
+    return [_plain(each) for each in value] if isinstance(value, (tuple, list)) else value
