@@ -68,7 +68,8 @@ def test_a_spec_goes_through_json_with_every_argument(given):
     assert one.spec == other.spec == made.spec
     assert other.observation_space == made.observation_space and other.action_space == made.action_space
     batch = gym.make_vec(ID, num_envs=2, **given)
-    assert gym.make_vec(again(batch.spec)).unwrapped.scenario == made.unwrapped.scenario
+    other = gym.make_vec(again(batch.spec))
+    assert other.unwrapped.scenario == made.unwrapped.scenario and other.spec == batch.spec
 
 
 @pytest.mark.parametrize("name", named_scenarios())

@@ -254,8 +254,8 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         """(B,) the seeds that the rows' generators began with; None before the first reset."""
         return tuple(self._seeds)
 
-    @property
-    def np_random(self) -> tuple[np.random.Generator | None, ...]:  # type: ignore[override,misc]
+    @property  # type: ignore[misc]
+    def np_random(self) -> tuple[np.random.Generator | None, ...]:  # type: ignore[override]
         """(B,) the rows' generators; None before the first reset."""
         return tuple(self._generators)
 
@@ -267,6 +267,8 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
         self._spec = told_spec(spec, self._horizon)
+        if self._spec is not None:  # as make_vec gives it for a spec that tells a horizon
+            self._spec.kwargs.setdefault("max_episode_steps", self._horizon)
 
     @property
     def lam(self) -> np.ndarray:

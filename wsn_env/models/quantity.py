@@ -160,7 +160,7 @@ def suggest(name: str, known: Iterable[object]) -> str:
     """What to write instead of an unknown name."""
     names = sorted(map(str, known))
     near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
-    return f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(names) or 'none'}"
+    return f"did you mean {' or '.join(near)}?" if near else f"known are {short(', '.join(names), 300) or 'none'}"
 
 
 def parse_overrides(pairs: Iterable[str]) -> dict[str, Any]:
