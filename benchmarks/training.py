@@ -87,8 +87,8 @@ def time_training(arguments: list[str]) -> None:
     from stable_baselines3 import PPO
     from stable_baselines3.common.policies import ActorCriticPolicy
 
-    import train
     from wsn_env.learning.sb3 import SB3VecEnv
+    from wsn_env.training import trainer as train
 
     settings = tyro.cli(train.Training, args=arguments)
     if settings.steps == train.Training.steps:

@@ -21,11 +21,11 @@ import tyro
 
 from studies.report import draw_curves, save_table
 from wsn_env.agents.ppo import PPOPolicy
-from wsn_env.cli import make_scenario
 from wsn_env.envs.merit import ORDERS
 from wsn_env.evaluation.comparison import evaluate
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.scenario import Scenario
+from wsn_env.scenario.options import make_scenario
 
 USUAL = "usual"
 DIFFERENT = {  # name: options of train.py

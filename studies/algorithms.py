@@ -19,12 +19,12 @@ import torch
 import tyro
 
 from studies.report import save_table
-from wsn_env.cli import make_scenario
 from wsn_env.envs.vector_env import ClusterVectorEnv
 from wsn_env.evaluation.scoring import score
 from wsn_env.learning.sb3 import SB3VecEnv
 from wsn_env.learning.training_reward import TrainingReward
 from wsn_env.scenario import Scenario
+from wsn_env.scenario.options import make_scenario
 
 ROWS = 256
 

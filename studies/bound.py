@@ -21,7 +21,6 @@ import numpy as np
 import tyro
 
 from wsn_env import Scenario, World, make_policy
-from wsn_env.cli import make_scenario
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.intervals import Measured
 from wsn_env.evaluation.progress import Progress, progress_bar
@@ -29,6 +28,7 @@ from wsn_env.evaluation.rollout import BLOCK, episodes, evaluation_seeds
 from wsn_env.models.measurement.level import Level
 from wsn_env.models.measurement.position import Position
 from wsn_env.reports.markdown import markdown_table
+from wsn_env.scenario.options import make_scenario
 from wsn_env.simulation.bound import Bound, why_no_bound
 from wsn_env.simulation.reference import Reference
 

@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 import tyro
 
-from train import Training, train
 from wsn_env.bluetooth.fitting import leave_one_out
 from wsn_env.bluetooth.recorded_evaluation import (
     RecordedEvaluation,
@@ -31,6 +30,8 @@ from wsn_env.models.recordings.dataset import read_dataset
 from wsn_env.reports.recorded_tables import print_recorded_tables, save_recorded
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.world import World
+from wsn_env.training.settings import Training
+from wsn_env.training.trainer import train
 
 MEMBERS = (1, 2, 3, 5)  # further ones: 2, 3, 4 and 6 of the receivers listen
 RULES = (

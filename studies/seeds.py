@@ -16,7 +16,6 @@ import numpy as np
 import tyro
 
 from wsn_env.agents.ppo import PPOPolicy
-from wsn_env.cli import make_scenario
 from wsn_env.evaluation.comparison import Evaluation, evaluate
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.front import hypervolumes, join_points, policy_points, reference_point, split_number
@@ -26,6 +25,7 @@ from wsn_env.evaluation.policies import make_policy, policy_names
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.reports.markdown import markdown_table
 from wsn_env.scenario import Scenario
+from wsn_env.scenario.options import make_scenario
 
 SLOW = ("ppo", "planner", "all")
 

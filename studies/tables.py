@@ -98,7 +98,7 @@ def play(scenario: Scenario, policy: str, episodes: int | None) -> dict[str, np.
 
 def scenario_of(name: str, settings: str = "") -> Scenario:
     """A preset with changes as on the command line, at its middle lam."""
-    from wsn_env.cli import make_scenario
+    from wsn_env.scenario.options import make_scenario
 
     scenario = make_scenario(name, settings.split(), [])
     return scenario if not isinstance(scenario.lam, tuple) else scenario.override(lam=scenario.lam_octaves[2])

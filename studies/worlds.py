@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 import tyro
 
-from wsn_env.cli import make_scenario
 from wsn_env.evaluation.comparison import Evaluation, evaluate
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.intervals import Summary
@@ -28,6 +27,7 @@ from wsn_env.learning.worlds import nodes_of, noises
 from wsn_env.models.quantity import check_quantity, parse_overrides
 from wsn_env.reports.markdown import markdown_table
 from wsn_env.scenario import Scenario
+from wsn_env.scenario.options import make_scenario
 
 SIZES = [f"{order}{size}" for order in ("nearest", "informed") for size in range(9)]
 RULES = ["greedy", "adaptive", "adaptive_informed", *SIZES]

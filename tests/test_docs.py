@@ -62,7 +62,7 @@ def test_no_block_is_empty(page):
 
 
 def test_the_readme_is_short():
-    assert len((ROOT / "README.md").read_text().splitlines()) < 120
+    assert len((ROOT / "README.md").read_text().splitlines()) < 100
 
 
 def test_every_scenario_and_policy_has_its_page(monkeypatch, tmp_path):

@@ -9,11 +9,11 @@ import pytest
 
 PACKAGES = (  # of wsn_env, from the bottom up
     *("compiled", "models", "scenario", "filters", "simulation", "envs", "evaluation", "learning", "agents"),
-    *("bluetooth", "reports", "papers", "cli"),
+    *("bluetooth", "reports", "papers", "training", "cli"),
 )
 ON_TOP = ("train", "benchmarks", "studies", "examples")  # beside wsn_env, in the same order
 FROM_ENVS_UP = {"gymnasium", "stable_baselines3", "torch"}
-TOP_LEVEL_ENTRIES = 15
+TOP_LEVEL_ENTRIES = 16
 
 ROOT = Path(__file__).parents[1]
 LAYERS = {name: height for height, name in enumerate((*PACKAGES, *ON_TOP))}

@@ -274,7 +274,7 @@ class Checked(Exception):
 
 
 def test_every_option_of_training(monkeypatch):
-    import train
+    from wsn_env.training import trainer as train
 
     def stop(*given):
         raise Checked

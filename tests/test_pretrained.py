@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 import tyro
 
-import train
 from tests.figures import found_blocks
 from wsn_env import Scenario, make_policy
 from wsn_env.agents.ppo import PRETRAINED
 from wsn_env.evaluation.comparison import evaluate
+from wsn_env.training import trainer as train
 
 DOCS = Path(__file__).parents[1] / "docs"
 STEPS = dict.fromkeys(("PreDC-v0", "Rssi-v0"), 12_000_000)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-import train
 from wsn_env import ClusterVectorEnv, Scenario, World
 from wsn_env.envs.prospects import ENTRY_FEATURES
 from wsn_env.envs.registration import IDS
@@ -12,6 +11,7 @@ from wsn_env.learning.network import EntryNetwork
 from wsn_env.learning.privileged import TRUTH_FEATURES, PrivilegedVectorEnv
 from wsn_env.learning.worlds import default_worlds, world_of
 from wsn_env.models import ScenarioError
+from wsn_env.training import trainer as train
 
 SMALL = dict(particles=50, nodes=60, side_m=50, crossing_m=20, periods=12)
 

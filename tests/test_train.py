@@ -14,16 +14,18 @@ import pytest
 import safetensors.numpy
 import torch
 
-import train
+import train as script
 from wsn_env import ClusterVectorEnv, Scenario, View, evaluate, make_policy
 from wsn_env.agents.ppo import PPOPolicy
-from wsn_env.cli import parse_overrides
 from wsn_env.evaluation.versions import versions
 from wsn_env.learning import run_folder
 from wsn_env.learning.actor_critic import actor_network
 from wsn_env.learning.checkpoint_file import pack, read_checkpoint, unpack, write_checkpoint
 from wsn_env.learning.network import EntryNetwork, PolicyNetwork
+from wsn_env.models.quantity import parse_overrides
 from wsn_env.reports.pages.learning_curves import read_progress
+from wsn_env.training import settings as training_settings
+from wsn_env.training import trainer as train
 
 SET = ["particles=50", "nodes=40", "side_m=50", "crossing_m=20", "periods=10"]
 SHORT = dict(steps=4096, rows=32, rollout=32, batch=512, epochs=2, episodes=8, checkpoint_steps=1024, set=SET)
@@ -42,7 +44,7 @@ def make_model(settings):
     interface = train.Settings(settings.action, "menu", settings.reward, settings.order)
     envs = train.SB3VecEnv(train.make_envs(settings, scenario, interface, settings.rows), stagger=True)
     return train.make_model(settings, train.ReplayableRows(envs)), train.facts_of(
-        train.settings_as_json(settings), scenario, Path(train.__file__)
+        train.settings_as_json(settings), scenario
     )
 
 
@@ -171,7 +173,7 @@ def test_so_does_one_that_was_killed(run, tmp_path):
     """Also with another checkpoint_steps, before the training's end or after it."""
     settings = SHORT | dict(episodes=0, checkpoint_steps=1)
     options = [f"--{name.replace('_', '-')}={value}" for name, value in settings.items() if name != "set"]
-    command = [sys.executable, train.__file__, "--name=short", f"--runs={tmp_path}", *options, "--set", *SET]
+    command = [sys.executable, script.__file__, "--name=short", f"--runs={tmp_path}", *options, "--set", *SET]
     checkpoint = tmp_path / "short" / "checkpoint.safetensors"
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
         while not checkpoint.exists() and process.poll() is None:
@@ -288,7 +290,7 @@ def test_a_checkpoint_of_other_code_or_settings_is_refused(run, tmp_path, monkey
         assert "version sources of wsn_env" in resume(tmp_path)
     with monkeypatch.context() as patch:
         preset = Scenario.named("PreDC-v0", decay_power=2.5)
-        patch.setattr(train, "make_scenario", lambda *_: preset.override(**parse_overrides(SET)))
+        patch.setattr(training_settings, "make_scenario", lambda *_: preset.override(**parse_overrides(SET)))
         assert "quantity detection.decay_power = " in resume(tmp_path)
     config = tmp_path / "short" / "config.json"
     config.write_text(config.read_text().replace('"gamma": 0.98', '"gamma": 0.5'))
@@ -304,7 +306,7 @@ def test_a_checkpoint_knows_the_files_beside_an_own_sensor(tmp_path):
     def files(number):
         (tmp_path / "beside.py").write_text(f"NUMBER = {number}\n")
         scenario = Scenario.named("PreDC-v0", measurement=f"{tmp_path / 'sharp.py'}:Sharp")
-        return run_folder.facts_of({"tracks": []}, scenario, Path(train.__file__))["file"]
+        return run_folder.facts_of({"tracks": []}, scenario)["file"]
 
     first, again, edited = files(1), files(1), files(2)
     assert first == again and first.keys() == edited.keys()
@@ -332,7 +334,7 @@ def test_checkpoints_that_could_execute_anything_are_not_opened(run, tmp_path, c
     options = [f"--{name.replace('_', '-')}={value}" for name, value in SHORT.items() if name != "set"]
     command = ["train.py", "--resume", "--name=short", f"--runs={tmp_path}", *options, "--set", *SET]
     monkeypatch.setattr(sys, "argv", command)
-    assert train.main() == 2
+    assert script.main() == 2
     said = capsys.readouterr().err
     assert said.splitlines()[-1].startswith(f"train.py: {old}")
 
@@ -466,7 +468,7 @@ def test_bad_settings_are_refused_before_anything_is_done(bad, tmp_path):
 def test_bad_options_are_one_line(options, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["train.py", "--runs", str(tmp_path), "--episodes", "0", *options.split()])
     try:
-        code = train.main()
+        code = script.main()
     except SystemExit as stopped:  # what tyro finds out prints its usage
         code = stopped.code
     said = capsys.readouterr().err
@@ -481,7 +483,7 @@ def test_a_file_where_a_folder_is_wanted_is_one_line(beside, tmp_path, monkeypat
     (runs / beside).write_text("")
     asked = ["--runs", str(runs), "--name", "short", "--episodes", "0", "--set", *SET]
     monkeypatch.setattr(sys, "argv", ["train.py", *asked])
-    assert train.main() == 2
+    assert script.main() == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and str(runs) in said
 
@@ -530,10 +532,10 @@ def test_saved_policies_are_checked(run, tmp_path):
 
 def test_help_explains_every_setting(capsys):
     with pytest.raises(SystemExit) as ended:
-        train.main(["--help"])
+        script.main(["--help"])
     shown = capsys.readouterr().out
     for name in train.Training.__dataclass_fields__:
         assert f"--{name.replace('_', '-')}" in shown
-    assert not ended.value.code and train.main(["--lam", "-3"]) == 2
+    assert not ended.value.code and script.main(["--lam", "-3"]) == 2
     told = capsys.readouterr().err
     assert "lam" in told and told.count("\n") == 1

@@ -141,13 +141,14 @@ def test_a_folder_that_nobody_may_write_into_is_told_before_anything_is_played(n
 TRAIN = """
 import contextlib, io, os, resource, sys
 from pathlib import Path
-import train
+import train as script
+from wsn_env.training import trainer as train
 
 folder = Path(sys.argv[1])
 def run(name, *more):
     sizes = "--steps 512 --rows 16 --rollout 16 --batch 128 --epochs 1 --episodes 0 --checkpoint-steps 256".split()
     small = "--set particles=30 nodes=20 side_m=40 crossing_m=15 periods=3".split()
-    return train.main(["--runs", str(folder), "--name", name, *more, *sizes, *small])
+    return script.main(["--runs", str(folder), "--name", name, *more, *sizes, *small])
 def limited(size):
     child = os.fork()
     if child == 0:

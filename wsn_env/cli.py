@@ -1,4 +1,4 @@
-"""The command `wsn`, also `python -m wsn_env`: evaluate, replay, calibrate, reproduce, compile."""
+"""The command `wsn`, also `python -m wsn_env`: evaluate, train, replay, calibrate, reproduce, compile."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ import tyro
 from wsn_env.evaluation.files import alone_in
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.models.own import own_error, own_place
-from wsn_env.models.quantity import parse_overrides
 from wsn_env.models.recordings.files import DatasetWarning
 from wsn_env.reports.terminal import NOBODY_READS, any_terminal
 from wsn_env.scenario import Scenario
+from wsn_env.scenario.options import make_scenario
+from wsn_env.training.settings import Training
 
 FILES = (  # that commands write into their folders
     "report.html evaluation.blocks.jsonl evaluation.csv evaluation.json evaluation.md front.csv front.json front.png"
@@ -111,16 +112,23 @@ class Compile:
     """Compile all kernels now and keep them, so that nothing has to wait for it later."""
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Run a command; bad input is one line on stderr and exit status 2, Ctrl-C is 130."""
+def main(arguments: list[str] | None = None, prog: str = "wsn") -> int:
+    """Run a command; bad input is one line on stderr and exit status 2, Ctrl-C is 130.
+
+    Args:
+        arguments: of the command line; None: the process's.
+        prog: what messages begin with.
+    """
     runs: dict[type, Callable[[Any], None]] = {
         Evaluate: run_evaluate,
+        Training: run_train,
         Replay: run_replay,
         Calibrate: run_calibrate,
         Reproduce: run_reproduce,
         Compile: run_compile,
     }
-    commands: dict[str, Callable[..., Any]] = {kind.__name__.lower(): kind for kind in runs}
+    commands: dict[str, Callable[..., Any]] = {kind.__name__.lower(): kind for kind in runs if kind is not Training}
+    commands["train"] = Training
     command: Any = None
     try:
         with any_terminal():
@@ -131,16 +139,20 @@ def main(arguments: list[str] | None = None) -> int:
     except BrokenPipeError:
         return NOBODY_READS
     except (ValueError, OSError, MemoryError) as problem:
-        print(f"wsn: {own_place(problem)}{problem}", file=sys.stderr)
+        print(f"{prog}: {own_place(problem)}{problem}", file=sys.stderr)
         return 2
     except Exception as problem:
         if not own_place(problem):
             raise
-        print(f"wsn: {own_error(problem)}", file=sys.stderr)
+        print(f"{prog}: {own_error(problem)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        kept = isinstance(command, Evaluate) and command.out
-        print("wsn: stopped" + ("; the same command continues where it was" if kept else ""), file=sys.stderr)
+        more = ""
+        if isinstance(command, Training):
+            more = f"; the same command with --resume continues {command.folder}"
+        elif isinstance(command, Evaluate) and command.out:
+            more = "; the same command continues where it was"
+        print(f"{prog}: stopped{more}", file=sys.stderr)
         return 130
     return 0
 
@@ -210,6 +222,15 @@ def run_evaluate(command: Evaluate) -> None:
     if command.out:
         remove_kept_blocks(command.out)
         print(f"written: {', '.join(str(command.out / name) for name in names)}")
+
+
+def run_train(command: Training) -> None:
+    """`wsn train`."""
+    try:
+        from wsn_env.training.trainer import train
+    except ImportError as problem:
+        raise ValueError(f"train: pip install 'wsn_env[train]' ({problem})") from None
+    train(command)
 
 
 def run_evaluate_recorded(command: Evaluate) -> None:
@@ -298,9 +319,3 @@ def run_compile(command: Compile) -> None:
     with progress_bar() as report:
         count = compile_everything(report)
     print(f"{count} kernels compiled in {time.perf_counter() - started:.0f} s; they are in {store_folder()}")
-
-
-def make_scenario(name: str, pairs: list[str], tracks: list[Path], **further: object) -> Scenario:
-    """A scenario from the options --scenario, --set and --tracks; `further` quantities win."""
-    recorded = {"motion": "recorded", "tracks": tuple(map(str, tracks))} if tracks else {}
-    return Scenario.named(name, **parse_overrides(pairs) | recorded | further)

@@ -80,9 +80,9 @@ def _run(command: list[str]) -> int:
         from studies import tuning
 
         return tuning.main(command[1:]) or 0
-    import train
+    import train as script
 
-    return train.main(command[1:])
+    return script.main(command[1:])
 
 
 def _forked(command: list[str], out: Path, last: int = 0, seconds: float | None = None) -> tuple[int, int]:

@@ -170,9 +170,9 @@ def say(mistake: str) -> str:
 
 
 def _train(arguments: list[str]) -> int:
-    import train
+    import train as script
 
-    return train.main(arguments)
+    return script.main(arguments)
 
 
 def write_files(folder: Path) -> None:

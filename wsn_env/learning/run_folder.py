@@ -50,18 +50,17 @@ def _read_config(path: Path) -> dict[str, Any]:
     return old
 
 
-def facts_of(settings: dict[str, Any], scenario: Scenario, script: Path) -> dict[str, dict[str, Any]]:
+def facts_of(settings: dict[str, Any], scenario: Scenario) -> dict[str, dict[str, Any]]:
     """What a training must share with the checkpoint that it goes on from.
 
     Args:
         settings: JSON values, with the files of recorded motion under "tracks".
-        script: that trains.
     """
     decisive = {name: value for name, value in settings.items() if name not in (*FREE, "name")}
     kinds = {type(kind).__module__ for kind in scenario.kinds}
     own = [file for kind in kinds if not kind.startswith("wsn_env.") for file in sources_of(kind)]
     contents = {file: file_digest(file) for file in (*own, *settings["tracks"])}
-    sources = versions() | {"sources of wsn_env": sources_digest(), script.name: file_digest(script)}
+    sources = versions() | {"sources of wsn_env": sources_digest()}
     quantities: dict[str, Any] = {}
     for part, value in json.loads(json.dumps(scenario.as_dict(), default=str)).items():
         inner = {f"{part}.{name}": one for name, one in value.items()} if isinstance(value, dict) else {part: value}

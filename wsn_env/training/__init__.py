@@ -1,0 +1,1 @@
+"""`wsn train`: a PPO scheduler for every trade-off, beside every baseline."""
