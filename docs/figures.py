@@ -43,6 +43,7 @@ MAKERS: dict[str, list[list[str]]] = {  # arguments of Python, one command after
     "reproduce": [["-m", "wsn_env", "reproduce", "all", "--out", "{out}"]],
     "tables": [["-m", "studies.tables", "--out", "{out}"]],
     "bound": [["-m", "studies.bound", "--out", "{out}"]],
+    "leaderboard": [["-m", "studies.leaderboard", "--out", "{out}"]],
     "particles": [["-m", "studies.particles", "--out", "{out}"]],
     "lifetime": [["-m", "studies.lifetime", "--out", "{out}"]],
     "worlds": [["-m", "studies.worlds", "--scenario", name, *RECORDED, "--out", "{out}"] for name in SHIPPED],

@@ -134,7 +134,7 @@ def evaluate_returns(study: Study, scenario: Scenario, folder: Path, lams) -> di
     path = folder / f"returns-{study.episodes}.json"
     if not path.exists():
         policy = PPOPolicy(scenario, path=str(folder / "policy.json"))
-        evaluation = evaluate({"ppo": policy}, scenario, lams, study.episodes, seed=1)
+        evaluation = evaluate({"ppo": policy}, scenario, lams, study.episodes, seed=1, progress=None)
         path.write_text(
             json.dumps({lam: evaluation.values("ppo", lam, "return").tolist() for lam in lams}), encoding="utf-8"
         )

@@ -51,7 +51,7 @@ def main(arguments: list[str] | None = None) -> int:
                 report(number, len(asked.scenarios), f"{name}, {count:,} particles")
                 scenario = Scenario.named(name, particles=count)
                 lam = scenario.lam if isinstance(scenario.lam, (int, float)) else scenario.lam[0]
-                found = evaluate(POLICY, scenario, lam, asked.episodes)
+                found = evaluate(POLICY, scenario, lam, asked.episodes, progress=None)
                 squares[count] = found.values(POLICY, lam, "rms_m") ** 2
             many = squares[MANY]
             cells = [str(Measured.root_ratio(squares[count], many)) for count in COUNTS]

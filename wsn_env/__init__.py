@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from wsn_env.models.state import Cluster as Cluster
     from wsn_env.models.state import Outcome as Outcome
     from wsn_env.models.state import State as State
+    from wsn_env.reports.episode_plot import plot_episode as plot_episode
+    from wsn_env.reports.front_plots import plot_fronts as plot_fronts
+    from wsn_env.reports.plots import plot_comparison as plot_comparison
     from wsn_env.scenario import Scenario as Scenario
     from wsn_env.simulation.view import View as View
     from wsn_env.simulation.world import World as World
@@ -43,6 +46,9 @@ _HOMES = {
     "as_policy": "wsn_env.evaluation.as_policy",
     "error_bound": "wsn_env.evaluation.bound",
     "score": "wsn_env.evaluation.scoring",
+    "plot_comparison": "wsn_env.reports.plots",
+    "plot_episode": "wsn_env.reports.episode_plot",
+    "plot_fronts": "wsn_env.reports.front_plots",
     "make_policy": "wsn_env.evaluation.policies",
     "register": "wsn_env.envs.registration",
     "register_envs": "wsn_env.envs.registration",

@@ -1,4 +1,4 @@
-"""The command `wsn`, also `python -m wsn_env`: evaluate, train, replay, calibrate, reproduce, compile."""
+"""The command `wsn`, also `python -m wsn_env`: evaluate, benchmark, train, replay, calibrate, reproduce, compile."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
+from wsn_env.envs.registration import IDS
 from wsn_env.evaluation.files import alone_in
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.models.own import own_error, own_place
@@ -24,7 +25,8 @@ from wsn_env.training.settings import Training
 
 FILES = (  # that commands write into their folders
     "report.html evaluation.blocks.jsonl evaluation.csv evaluation.json evaluation.md front.csv front.json front.png"
-    " tracks.csv tracks.json tracks.md tracks.png calibration.json calibration.md calibration.png"
+    " tracks.csv tracks.json tracks.md tracks.png benchmark.md benchmark.csv"
+    " calibration.json calibration.md calibration.png"
 ).split()
 
 
@@ -58,6 +60,25 @@ class Evaluate:
     """Of a running Ray cluster, such as auto or HOST:6379; left out: one on this machine."""
     out: Path | None = None
     """Folder for the files; left out: only the table. A run that was stopped continues from it."""
+
+
+@dataclass
+class Benchmark:
+    """The standard benchmark: every scenario at its trade-offs, on 1,000 fixed episodes each. A score a scenario, 0 for
+    random choices and 1 for the best policy known, and a table to paste."""
+
+    policy: list[str]
+    """Policies, as for evaluate."""
+    scenarios: list[str] = field(default_factory=lambda: list(IDS))
+    """Which; an aggregate is of all."""
+    episodes: int = 1000
+    """How many of the 1,000, a multiple of 50: for a first look."""
+    engine: Literal["local", "ray"] = "local"
+    """As for evaluate."""
+    address: str | None = None
+    """As for evaluate."""
+    out: Path = Path("out/benchmark")
+    """Folder for benchmark.md, benchmark.csv and each scenario's rows. A run that was stopped continues from it."""
 
 
 @dataclass
@@ -121,6 +142,7 @@ def main(arguments: list[str] | None = None, prog: str = "wsn") -> int:
     """
     runs: dict[type, Callable[[Any], None]] = {
         Evaluate: run_evaluate,
+        Benchmark: run_benchmark,
         Training: run_train,
         Replay: run_replay,
         Calibrate: run_calibrate,
@@ -133,7 +155,7 @@ def main(arguments: list[str] | None = None, prog: str = "wsn") -> int:
     try:
         with any_terminal():
             command = tyro.extras.subcommand_cli_from_dict(commands, prog="wsn", args=arguments)
-            folder = command.out if isinstance(command, (Evaluate, Calibrate)) else None
+            folder = command.out if isinstance(command, (Evaluate, Benchmark, Calibrate)) else None
             with warnings_on_one_line(), nullcontext() if folder is None else alone_in(folder, FILES):
                 runs[type(command)](command)
     except BrokenPipeError:
@@ -150,7 +172,7 @@ def main(arguments: list[str] | None = None, prog: str = "wsn") -> int:
         more = ""
         if isinstance(command, Training):
             more = f"; the same command with --resume continues {command.folder}"
-        elif isinstance(command, Evaluate) and command.out:
+        elif isinstance(command, (Evaluate, Benchmark)) and command.out:
             more = "; the same command continues where it was"
         print(f"{prog}: stopped{more}", file=sys.stderr)
         return 130
@@ -222,6 +244,34 @@ def run_evaluate(command: Evaluate) -> None:
     if command.out:
         remove_kept_blocks(command.out)
         print(f"written: {', '.join(str(command.out / name) for name in names)}")
+
+
+def run_benchmark(command: Benchmark) -> None:
+    """`wsn benchmark`."""
+    from wsn_env.evaluation.kept_blocks import remove_kept_blocks
+    from wsn_env.evaluation.policies import label_and_source, named_policies
+    from wsn_env.evaluation.ray_engine import on_ray
+    from wsn_env.evaluation.standard import play_standard, scores, standard_scenario
+    from wsn_env.reports.standard_tables import print_standard, save_standard
+
+    if command.address and command.engine != "ray":
+        raise ValueError(f"--address {command.address}: only with --engine ray")
+    policies = dict(map(label_and_source, command.policy))
+    for name in command.scenarios:  # before anything is played
+        named_policies(command.policy, standard_scenario(name))
+    evaluations = []
+    for name in command.scenarios:
+        engine = on_ray(command.address) if command.engine == "ray" else None
+        with progress_bar() as progress:
+            evaluation = play_standard(policies, name, command.episodes, command.out / name, progress, engine)
+        evaluation.save(command.out / name)
+        evaluations.append(evaluation)
+    found = scores(evaluations)
+    written = save_standard(found, command.out)
+    print_standard(found)
+    for name in command.scenarios:
+        remove_kept_blocks(command.out / name)
+    print(f"written: {', '.join(map(str, written))}")
 
 
 def run_train(command: Training) -> None:

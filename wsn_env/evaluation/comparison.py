@@ -14,6 +14,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from wsn_env.evaluation.files import alone_in, replacing
 from wsn_env.evaluation.intervals import Summary
 from wsn_env.evaluation.kept_blocks import KeptBlocks
 from wsn_env.evaluation.policies import Policy, named_policies
-from wsn_env.evaluation.progress import Progress
+from wsn_env.evaluation.progress import Progress, no_progress, progress_bar
 from wsn_env.evaluation.rollout import BLOCK, Block, Engine, change_lam, evaluation_seeds, in_this_process
 from wsn_env.evaluation.versions import versions
 from wsn_env.models.arguments import checked, checked_but
@@ -99,6 +100,31 @@ class Evaluation:
         """Policies, the best mean return first."""
         return sorted(self.policies, key=lambda policy: -self.values(policy, lam, "return").mean())
 
+    def to_frame(self) -> Any:
+        """The rows as a pandas DataFrame, one for each (policy, lam, episode), with the columns of evaluation.csv.
+
+        Raises:
+            ValueError: without pandas.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise ValueError("to_frame needs pandas: pip install pandas") from None
+        return pandas.DataFrame(self.rows, columns=COLUMNS)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: at each lam the policies, the best first, with 95 % intervals."""
+        what = {"return": "return", "rms_m": "RMS m", "error_m": "error m", "energy_mj": "energy mJ a period"}
+        head = "".join(f"<th>{escape(name)}</th>" for name in ("lam", "policy", *what.values()))
+        rows = []
+        for lam in self.lams:
+            for policy in self.ranked(lam):
+                summary = self.summary(policy, lam)
+                cells = [f"{lam:g}", policy, *(summary[column].text for column in what)]
+                rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
+        title = f"{self.scenario.name}, {self.episodes} common episodes, seed {self.seed}; means, 95 % intervals"
+        return f"<table><caption>{escape(title)}</caption><tr>{head}</tr>{''.join(rows)}</table>"
+
     def families(self) -> list[str]:
         """Stems of the policies whose names differ only by a number at the end: "nearest" of nearest0, nearest1, ..."""
         stems = [stem_of(policy) for policy in self.policies if stem_of(policy) != policy]
@@ -171,7 +197,7 @@ def evaluate(  # noqa: PLR0913
     episodes: int = 100,
     seed: int = 0,
     keep: str | Path | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = True,
     threads: int | None = None,
     engine: Engine | None = None,
 ) -> Evaluation:
@@ -186,7 +212,8 @@ def evaluate(  # noqa: PLR0913
         seed: another seed, other episodes; training never meets any of them.
         keep: a folder for finished blocks, so that a stopped run continues; None: none are kept. Of an object without
             a repr its state decides whether they are its own; what it reads, too, but for files read before.
-        progress: called with (blocks done, of, what).
+        progress: called with (blocks done, of, what); True: a bar, in terminals and notebooks; False or
+            None: nothing.
         threads: as World's.
         engine: where the blocks are played; None: in this process. The rows do not depend on it.
 
@@ -209,10 +236,11 @@ def evaluate(  # noqa: PLR0913
         kept = KeptBlocks(keep, scenario, _settings(scenario, named, lams, episodes, seed), list(named.values()))
         missing = [block for block in blocks.values() if not kept.has(block)]
         played = (engine or in_this_process(threads))(missing)
-        for done, (block, measured) in enumerate(played, len(blocks) - len(missing)):
-            kept.put(block, measured)
-            if progress:
-                progress(done + 1, len(blocks), block.name if block.lam is None else f"{block.name}, lam {block.lam:g}")
+        with progress_bar(None if progress is True else progress or no_progress) as report:
+            for done, (block, measured) in enumerate(played, len(blocks) - len(missing)):
+                kept.put(block, measured)
+                at = "" if block.lam is None else f", lam {block.lam:g}"
+                report(done + 1, len(blocks), block.name + at)
     rows: list[Row] = []
     for lam in lams:
         for name, policy in named.items():

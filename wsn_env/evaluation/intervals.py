@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from math import floor, isfinite, log10
+from math import floor, inf, isfinite, log10
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +23,20 @@ class Summary:
     mean: float
     low: float
     high: float
+
+    def __repr__(self) -> str:
+        return f"Summary({self.text})"
+
+    @property
+    def text(self) -> str:
+        """Rounded to what the interval tells: "-120.3 [-121.5, -119.1]"."""
+        width, values = self.high - self.low, (self.mean, self.low, self.high)
+        if not 0.0 < width < inf:
+            mean, low, high = (f"{value:.6g}" for value in values)
+        else:
+            digits = max(0, min(9, 1 - floor(log10(width))))
+            mean, low, high = (f"{value:.{digits}f}" for value in values)
+        return f"{mean} [{low}, {high}]"
 
     @classmethod
     def of(cls, values: ArrayLike) -> Summary:

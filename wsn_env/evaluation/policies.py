@@ -104,7 +104,8 @@ def named_policies(texts: str | Iterable[str] | Mapping[str, Policy], scenario: 
         for text in dict.fromkeys([texts] if isinstance(texts, str) else texts):
             if not isinstance(text, str):
                 raise ValueError(f"policies: {_NO_NAME.format(type(text).__name__)}")
-            label, policy = _make_labelled_policy(text, scenario)
+            label, source = label_and_source(text)
+            policy = make_policy(source, scenario)
             if label in named:
                 raise ValueError(f"policies: {label!r} is there twice: labels must differ")
             named[label] = policy
@@ -119,13 +120,13 @@ def named_policies(texts: str | Iterable[str] | Mapping[str, Policy], scenario: 
 _NO_NAME = "{} is no name: give policies of your own as {{name: policy}}"
 
 
-def _make_labelled_policy(text: str, scenario: Scenario) -> tuple[str, Policy]:
-    """("ppo", policy) from "ppo=runs/mine/policy.json"; a name or a path alone is its own label."""
+def label_and_source(text: str) -> tuple[str, str]:
+    """("ppo", "runs/mine/policy.json") from "ppo=runs/mine/policy.json"; a name or a path alone is its own label."""
     label, equals, source = text.partition("=")
     labelled = equals and ":" not in label  # else parameters: quadrants:n=2
     if labelled and not label:
         raise ValueError(f"policies: {text!r} has no label before the =")
-    return (label, make_policy(source, scenario)) if labelled else (text, make_policy(text, scenario))
+    return (label, source) if labelled else (text, text)
 
 
 def _find_entry_point(name: str) -> tuple[EntryPoint | None, dict[str, int]]:

@@ -61,13 +61,13 @@ class HeldOut:
     ) -> None:
         self._scenario, self._interface = scenario, Interface(scenario, settings)
         self._lams, self._episodes = lams, episodes
-        played = evaluate(dict(rules), scenario, lams, episodes, SEED)
+        played = evaluate(dict(rules), scenario, lams, episodes, SEED, progress=None)
         self._best = {lam: played.values(played.ranked(lam)[0], lam, "return") for lam in lams}
 
     def __call__(self, network: PolicyNetwork) -> dict[float, Lead]:
         """Of a network, by trade-off."""
         policies: dict[str, Policy] = {"network": Acting(self._interface, network)}
-        played = evaluate(policies, self._scenario, self._lams, self._episodes, SEED)
+        played = evaluate(policies, self._scenario, self._lams, self._episodes, SEED, progress=None)
         leads = {}
         for lam, best in self._best.items():
             percent = 100.0 * (played.values("network", lam, "return") - best) / abs(best.mean())

@@ -2,34 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import count, cycle
 from textwrap import fill
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from wsn_env.envs.rendering.colours import GREY, LINES
 from wsn_env.evaluation.comparison import Evaluation
 from wsn_env.evaluation.front import (
     Fronts,
     Point,
+    find_fronts,
     join_points,
     reference_point,
     split_number,
 )
+from wsn_env.models.arguments import checked
+from wsn_env.reports.labels import Label, write_labels
 from wsn_env.reports.pictures import escape_label
-from wsn_env.reports.plots import draw_reference_line, label_decades
+from wsn_env.reports.plots import axes_of, draw_reference_line, label_decades
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MARKERS = "osD^vP*X<>p"  # for where colours run out or into each other
+MARKERS = "osD^vP*d<>p"  # for where colours run out or into each other
 MARGIN = 1.2  # of the picture beyond the reference point and the best figures, as a factor
-LETTER = (6, 14)  # px that one takes
+SMALL = 8.0  # points
 NARROW = 4  # errors that span less are drawn on a linear axis
-
-
-Label = tuple[str, tuple[float, float], tuple[int, int], str]  # text, point, offset [pt], colour
 
 
 def draw_fronts(evaluation: Evaluation, found: Fronts) -> Figure:
@@ -39,10 +38,25 @@ def draw_fronts(evaluation: Evaluation, found: Fronts) -> Figure:
     """
     from matplotlib.figure import Figure
 
+    figure = Figure(figsize=(9, 6), layout="constrained")
+    plot_fronts(evaluation, found, figure.subplots())
+    return figure
+
+
+@checked
+def plot_fronts(evaluation: Evaluation, found: Fronts | None = None, ax: Any = None) -> Any:
+    """Fronts of mean error against energy over the trade-offs, as `draw_fronts`, for a notebook.
+
+    Args:
+        found: some fronts; None: every policy's, those that differ by a number at the end together.
+        ax: axes to draw in; None: new ones.
+
+    Returns: the axes.
+    """
+    axes = axes_of(ax)
+    found = find_fronts(evaluation) if found is None else found
     error, energy = reference_point(evaluation.scenario)
     top, right = error * MARGIN, energy * MARGIN
-    figure = Figure(figsize=(9, 6), layout="constrained")
-    axes = figure.subplots()
     axes.set(xscale="log", yscale="log", title=escape_label(front_title(evaluation)))
     beyond: list[Point] = []
     labels: list[Label] = []
@@ -50,7 +64,7 @@ def draw_fronts(evaluation: Evaluation, found: Fronts) -> Figure:
         near = [point for point in points if point.error.mean < top and point.energy.mean < right]
         beyond += [point for point in points if point not in near]
         _draw_line(axes, name, near, colour, marker, over)
-        labels += [(*label, colour) for label in _labels(near)]
+        labels += [Label(text, point, colour, SMALL) for text, point in _labels(near)]
     drawn = [point for point in join_points(found.values()) if point not in beyond]
     left = min((point.energy.low for point in drawn if point.energy.low > 0), default=energy / 10) / MARGIN
     bottom = min((point.error.low for point in drawn if point.error.low > 0), default=error / 10) / MARGIN**0.5
@@ -71,13 +85,14 @@ def draw_fronts(evaluation: Evaluation, found: Fronts) -> Figure:
     for axis in (axes.xaxis, axes.yaxis):
         if axis.get_scale() == "log":
             label_decades(axis)
-    _write_labels(axes, labels)
     outside = [f"{p.policy}{_at(p)}: {p.energy.mean:.3g} mJ, {p.error.mean:.3g} m" for p in beyond]
     lines = fill("beyond: " + "; ".join(outside), 120) if outside else ""
     axes.set_xlabel(escape_label(f"energy [mJ per period]\n{lines}".rstrip()))
     axes.grid(alpha=0.3, which="both", linewidth=0.5)
-    axes.legend(frameon=False, loc="lower left")
-    return figure
+    below = -0.12 - 0.035 * len(lines.splitlines())  # the words under the axis
+    axes.legend(frameon=False, loc="upper center", bbox_to_anchor=(0.5, below), ncols=4, fontsize=9)
+    write_labels(axes, labels)
+    return axes
 
 
 def _draw_line(axes: Axes, name: str, points: list[Point], colour: str, marker: str, over: float) -> None:
@@ -103,23 +118,13 @@ def _draw_line(axes: Axes, name: str, points: list[Point], colour: str, marker: 
     )
 
 
-def _labels(points: list[Point]) -> list[tuple[str, tuple[float, float], tuple[int, int]]]:
-    """Words, point and offset [pt]: a family's numbers, or the lams at the ends of a policy's front."""
+def _labels(points: list[Point]) -> list[tuple[str, tuple[float, float]]]:
+    """Words and points: a family's numbers, or the lams at the ends of a policy's front."""
     if len({point.policy for point in points}) > 1:
-        return [(split_number(p.policy)[1], (p.energy.mean, p.error.mean), (-9, -11)) for p in points]
+        return [(split_number(p.policy)[1], (p.energy.mean, p.error.mean)) for p in points]
     by_lam = sorted(points, key=lambda point: point.lam or 0)
     ends = (by_lam[0], by_lam[-1]) if len(points) > 1 else ()
-    return [(_at(p), (p.energy.mean, p.error.mean), (2, 8)) for p in ends]
-
-
-def _write_labels(axes: Axes, labels: Sequence[Label]) -> None:
-    """Those of earlier fronts first; what would lie on another is left out."""
-    taken: list[tuple[float, float, int]] = []
-    for text, point, place, colour in labels:
-        x, y = axes.transData.transform(point) + place
-        if all(abs(x - left) > LETTER[0] * max(n, len(text)) or abs(y - low) > LETTER[1] for left, low, n in taken):
-            taken.append((x, y, len(text)))
-            axes.annotate(escape_label(text), point, xytext=place, textcoords="offset points", fontsize=8, color=colour)
+    return [(_at(p).strip(), (p.energy.mean, p.error.mean)) for p in ends]
 
 
 def _at(point: Point) -> str:

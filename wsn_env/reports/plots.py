@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from math import pi, sqrt
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wsn_env.envs.rendering.colours import BLUE, DARK, GREEN, GREY, VERMILION
 from wsn_env.evaluation.comparison import Evaluation, stem_of
 from wsn_env.evaluation.intervals import Summary
+from wsn_env.models.arguments import checked
+from wsn_env.models.quantity import short, suggest
+from wsn_env.reports.labels import Label, write_labels
 from wsn_env.reports.pictures import escape_label
 
 if TYPE_CHECKING:
@@ -35,13 +38,37 @@ def draw_comparison(evaluation: Evaluation, lam: float, emphasis: str | None = N
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8, 5.2), layout="constrained")
-    axes = figure.subplots()
-    points = {}
+    plot_comparison(evaluation, lam, emphasis, figure.subplots())
+    return figure
+
+
+@checked
+def plot_comparison(
+    evaluation: Evaluation, lam: float | None = None, emphasis: str | None = None, ax: Any = None
+) -> Any:
+    """Mean error against energy at one trade-off, as `draw_comparison`, for a notebook.
+
+    Args:
+        lam: one of the evaluation's; None: the middle one.
+        emphasis: the policy to make stand out.
+        ax: axes to draw in; None: new ones.
+
+    Returns: the axes.
+    """
+    if emphasis is not None and emphasis not in evaluation.policies:
+        raise ValueError(f"emphasis {emphasis!r} is unknown: {suggest(emphasis, evaluation.policies)}")
+    axes = axes_of(ax)
+    lam = evaluation.middle_lam if lam is None else lam
+    points, labels = {}, []
     for policy in evaluation.policies:
         s = evaluation.summary(policy, lam)
         points[policy] = s["energy_mj"], s["error_m"]
         numbered = stem_of(policy) != policy and stem_of(policy) in evaluation.families()
-        _draw_point(axes, policy, *points[policy], strong=policy == emphasis, numbered=numbered)
+        strong = policy == emphasis
+        colour = EMPHASIS if strong else FAMILY if numbered else OTHER
+        _draw_point(axes, *points[policy], colour, strong)
+        name = policy.removeprefix(stem_of(policy)) if numbered else policy
+        labels.append(Label(name, (points[policy][0].mean, points[policy][1].mean), colour))
     for stem in evaluation.families():
         family = sorted(
             (points[policy][0].mean, points[policy][1].mean) for policy in points if stem_of(policy) == stem
@@ -66,14 +93,31 @@ def draw_comparison(evaluation: Evaluation, lam: float, emphasis: str | None = N
         escape_label(f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes")
     )
     axes.grid(alpha=0.3)
-    return figure
+    write_labels(axes, labels)
+    return axes
+
+
+def axes_of(ax: Any) -> Axes:
+    """The axes; None: new ones, of a figure that a notebook shows.
+
+    Raises:
+        ValueError: no axes.
+    """
+    import matplotlib.pyplot as plt
+    from matplotlib.axes import Axes
+
+    if ax is None:
+        return plt.subplots(figsize=(8, 5.2), layout="constrained")[1]
+    if not isinstance(ax, Axes):
+        raise ValueError(f"ax = {short(repr(ax))}: must be matplotlib's axes, or None")
+    return ax
 
 
 def label_decades(axis: Axis) -> None:
     """Numbers in full at 1, 2, 3, 5 and 7 of each decade of a logarithmic axis."""
     axis.set_major_formatter(lambda value, _: f"{value:g}")
     axis.set_minor_formatter(lambda value, _: f"{value:g}" if f"{value:e}"[0] in "2357" else "")
-    axis.set_tick_params(which="both", labelsize=9)
+    axis.set_tick_params(which="both", labelsize=9, length=3.5)
 
 
 def draw_reference_line(axes: Axes, evaluation: Evaluation) -> None:
@@ -84,8 +128,7 @@ def draw_reference_line(axes: Axes, evaluation: Evaluation) -> None:
         axes.axhline(ROUND * all_awake_m, color=REFERENCE, linewidth=1, linestyle=":", label=label)
 
 
-def _draw_point(axes: Axes, policy: str, energy: Summary, error: Summary, strong: bool, numbered: bool) -> None:
-    colour = EMPHASIS if strong else FAMILY if numbered else OTHER
+def _draw_point(axes: Axes, energy: Summary, error: Summary, colour: str, strong: bool) -> None:
     axes.errorbar(
         energy.mean,
         error.mean,
@@ -95,14 +138,4 @@ def _draw_point(axes: Axes, policy: str, energy: Summary, error: Summary, strong
         markersize=15 if strong else 5,
         color=colour,
         zorder=3 if strong else 2,
-    )
-    label = policy.removeprefix(stem_of(policy)) if numbered else policy
-    place = (-11, -11) if numbered else (7, 5)
-    axes.annotate(
-        escape_label(label),
-        (energy.mean, error.mean),
-        xytext=place,
-        textcoords="offset points",
-        fontsize=9,
-        color=colour,
     )
