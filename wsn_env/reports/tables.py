@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from wsn_env.evaluation.comparison import Evaluation
 from wsn_env.evaluation.files import replacing
@@ -102,22 +102,68 @@ def wide_console() -> Console:
     return console if console.is_terminal else Console(width=160, markup=False, emoji=False)
 
 
-def print_tables(evaluation: Evaluation, reference: str | None = None) -> None:
-    """One table for each lam."""
-    from rich.table import Table
+def print_tables(evaluation: Evaluation, reference: str | None = None, most: int | None = None) -> None:
+    """A table for each lam that fits 80 columns; evaluation.md has all columns.
 
+    Args:
+        reference: what others are compared with; None: the first.
+        most: of the best policies are shown, beside the reference, in one table at the middle lam, with a line for
+            each other lam; None: all of them, at every lam.
+    """
     reference = reference or evaluation.policies[0]
     console = wide_console()
-    for lam in evaluation.lams:
-        title = f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes"
-        caption = f"means, 95 % bootstrap intervals; {reference} - policy: paired difference of returns"
-        lines = f"{caption}; {describe_reference(evaluation)}", *describe_best_in_hindsight(evaluation, lam)
-        table = Table(title=title, caption="\n".join(lines))
-        for name in table_header(evaluation, reference):
-            table.add_column(name, justify="left" if name == "policy" else "right")
-        for row in table_rows(evaluation, lam, reference):
-            table.add_row(*row)
-        console.print(table)
+    for lam in evaluation.lams if most is None else [evaluation.middle_lam]:
+        ranked = evaluation.ranked(lam)
+        shown = [policy for policy in ranked if most is None or policy in (*ranked[:most], reference)]
+        console.print(_terminal_table(evaluation, lam, reference, shown))
+        notes = [f"{reference} - policy: paired difference of returns, 95 % bootstrap interval; mJ a period"]
+        notes += [f"{len(ranked) - len(shown)} more: evaluation.md"] if len(shown) < len(ranked) else []
+        notes += describe_best_in_hindsight(evaluation, lam)
+        console.print("\n".join(notes), style="dim")
+    if most is not None:
+        for lam in evaluation.lams:
+            console.print(_line_of(evaluation, lam, reference))
+    has = has_reference(evaluation.scenario)
+    console.print(f"{'/ref: ' if has else ''}{describe_reference(evaluation)}", style="dim")
+
+
+def _terminal_table(evaluation: Evaluation, lam: float, reference: str, shown: list[str]) -> Any:
+    from rich import box
+    from rich.table import Table
+
+    cap, dying = evaluation.scenario.error_cap_m, nodes_die(evaluation)
+    title = f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes"
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", padding=(0, 1, 0, 0), pad_edge=False)
+    error = ["RMS m"] if cap is None else ["capped m"]
+    error += ["/ref"] if has_reference(evaluation.scenario) else []
+    last = "functional" if dying else "lost"
+    for name in ("policy", "return", f"{reference} - policy", *error, "mJ", "awake", last):
+        table.add_column(name, justify="left" if name == "policy" else "right", overflow="fold")
+    for policy in shown:
+        s = evaluation.summary(policy, lam)
+        difference = evaluation.difference(reference, policy, lam)
+        ratio = evaluation.rms_over_reference(policy, lam)
+        table.add_row(
+            policy,
+            f"{s['return'].mean:.1f}",
+            "" if policy == reference else format_interval(difference, 1, "+"),
+            f"{s['rms_m' if cap is None else 'error_m'].mean:.3f}",
+            *([] if ratio is None else [f"{ratio.mean:.2f}"]),
+            f"{s['energy_mj'].mean:.3g}",
+            f"{s['members'].mean:.1f}",
+            f"{s['functional'].mean:.0f}" if dying else f"{s['lost'].mean:.2f}",
+        )
+    return table
+
+
+def _line_of(evaluation: Evaluation, lam: float, reference: str) -> str:
+    """How far a policy is ahead of the best of the others."""
+    best = next(policy for policy in evaluation.ranked(lam) if policy != reference)
+    own = evaluation.values(reference, lam, "return").mean()
+    ahead = evaluation.difference(reference, best, lam)
+    scale = 100 / max(abs(evaluation.values(best, lam, "return").mean()), 1e-12)
+    share = format_interval(Summary(*(scale * value for value in (ahead.mean, ahead.low, ahead.high))), 1, "+")
+    return f"lam {lam:g}: {reference} {own:.1f}, ahead of {best}, the best of the others, by {share} %"
 
 
 def format_markdown(evaluation: Evaluation, lam: float, reference: str) -> str:

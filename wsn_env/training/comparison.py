@@ -47,5 +47,5 @@ def compare(settings: Training, scenario: Scenario, policies: dict[str, Policy],
     with progress_bar() as report:
         page = write_report(folder, evaluation, policies, made, report)
     remove_kept_blocks(folder)
-    print_tables(evaluation, reference="ppo")
+    print_tables(evaluation, reference="ppo", most=10)
     print(f"written: {folder / 'evaluation.csv'}, {folder / 'comparison.png'}, {page}")
