@@ -16,6 +16,8 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from packaging.version import Version
 
+import wsn_env
+
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 FOR_USERS = "train plot front render ray".split()  # extras
@@ -151,3 +153,10 @@ def test_a_working_folder_may_hold_agents_of_its_own(own, built, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert all(Path(line).is_relative_to(tmp_path / "site") for line in done.stdout.splitlines())
+
+
+def test_every_page_names_the_same_version():
+    wanted = PROJECT["project"]["version"]
+    assert wanted == wsn_env.__version__
+    assert f"\nversion: {wanted}\n" in (ROOT / "CITATION.cff").read_text()
+    assert f"version = {{{wanted}}}" in (ROOT / "docs" / "citing.md").read_text()
