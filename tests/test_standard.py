@@ -62,7 +62,12 @@ def test_the_aggregate_is_an_interquartile_mean():
 
 def test_the_command(tmp_path, capsys, monkeypatch):
     mine = tmp_path / "mine.py"
-    mine.write_text("from wsn_env.agents.nearest import Nearest\nclass Two(Nearest):\n    n: int = 2\n")
+    mine.write_text(
+        "from wsn_env.agents.nearest import Nearest\n"
+        "class Two(Nearest):\n"
+        "    def __init__(self, scenario):\n"
+        "        super().__init__(scenario, n=2)\n"
+    )
     asked = ["benchmark", "--policy", f"mine={mine}:Two", "nearest2", "--scenarios", "PreDC-v0", "Underwater-v0"]
     assert cli.main([*asked, "--episodes", "50", "--out", str(tmp_path / "out")]) == 0
     assert "written: " in capsys.readouterr().out
