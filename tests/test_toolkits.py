@@ -16,6 +16,7 @@ from tests.test_env import SMALL
 from wsn_env import Cluster, ClusterEnv, ClusterVectorEnv, Scenario, as_policy, evaluate, make_policy, score
 from wsn_env.envs.registration import CONTINUOUS, IDS
 from wsn_env.models.quantity import ScenarioError, UnknownKeyword
+from wsn_env.reports.pages.evaluation_page import write_report
 from wsn_env.scenario import named_scenarios
 
 ID = "wsn_env/PreDC-v0"
@@ -261,6 +262,22 @@ def test_a_function_is_a_policy():
     envs = ClusterVectorEnv(5, scenario)
     assert (evaluation.values("mine", 4.0, "return") == score(lambda _: np.full(5, 13), envs)).all()
     assert (evaluation.values("mine", 4.0, "reference_m") > 0).all()
+
+
+def test_a_model_is_replayed_reported_and_drawn_like_any_policy(tmp_path):
+    import matplotlib
+
+    matplotlib.use("Agg")
+    mine = as_policy(lambda observations: np.full(len(observations), 13))
+    scenario = Scenario.of("PreDC-v0", **SMALL)
+    recording = wsn_env.replay(
+        {"mine": mine, "rule": make_policy("nearest3", scenario)}, scenario, 3, tmp_path / "a.html"
+    )
+    assert [episode.policy for episode in recording.episodes] == ["mine", "rule"]
+    assert "mine" in (tmp_path / "a.html").read_text()
+    evaluation = evaluate({"mine": mine}, scenario, episodes=2)
+    assert "mine" in write_report(tmp_path, evaluation, {"mine": mine}).read_text()
+    assert "ForeignPolicy" in wsn_env.plot_episode(mine, scenario).get_title()
 
 
 def test_models_of_libraries_are_policies():

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from wsn_env.models.state import State as State
     from wsn_env.reports.episode_plot import plot_episode as plot_episode
     from wsn_env.reports.front_plots import plot_fronts as plot_fronts
+    from wsn_env.reports.pages.replay_page import replay as replay
     from wsn_env.reports.plots import plot_comparison as plot_comparison
     from wsn_env.scenario import Scenario as Scenario
     from wsn_env.simulation.view import View as View
@@ -46,6 +47,7 @@ _HOMES = {
     "as_policy": "wsn_env.evaluation.as_policy",
     "error_bound": "wsn_env.evaluation.bound",
     "score": "wsn_env.evaluation.scoring",
+    "replay": "wsn_env.reports.pages.replay_page",
     "plot_comparison": "wsn_env.reports.plots",
     "plot_episode": "wsn_env.reports.episode_plot",
     "plot_fronts": "wsn_env.reports.front_plots",

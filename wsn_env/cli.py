@@ -321,7 +321,6 @@ def run_evaluate_recorded(command: Evaluate) -> None:
 def run_replay(command: Replay) -> None:
     """`wsn replay`."""
     from wsn_env.bluetooth.recorded_evaluation import replay_scenario
-    from wsn_env.evaluation.policies import named_policies
     from wsn_env.reports.pages.replay_page import replay
 
     lam = {} if command.lam is None else {"lam": command.lam}
@@ -329,7 +328,7 @@ def run_replay(command: Replay) -> None:
     if command.recording:
         calibrated = any(pair.startswith("calibration=") for pair in command.set)
         scenario = replay_scenario(scenario, command.recording, calibrated)
-    recording = replay(named_policies(command.policy, scenario), scenario, command.seed, command.out)
+    recording = replay(command.policy, scenario, command.seed, command.out)
     for episode in recording.episodes:
         print(f"{episode.policy}: RMS {episode.rms_m:.3f} m, {episode.energy_mj:.4g} mJ a period")
     print(f"written: {command.out} ({command.out.stat().st_size / 1000:.0f} kB)")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wsn_env.envs.rendering.colours import BLUE, DARK, GREY, VERMILION
-from wsn_env.evaluation.policies import Policy, make_policy
+from wsn_env.evaluation.policies import Policy, named_policies
 from wsn_env.evaluation.rollout import FIRST_SEED, episodes
 from wsn_env.models.arguments import checked_but
 from wsn_env.models.quantity import whole_number
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     pass
 
 
-@checked_but("seed")
+@checked_but("policy", "seed")
 def plot_episode(policy: str | Policy, scenario: str | Scenario, seed: int = FIRST_SEED, ax: Any = None) -> Any:
     """Play an episode and draw it from above, for a notebook.
 
@@ -33,7 +33,8 @@ def plot_episode(policy: str | Policy, scenario: str | Scenario, seed: int = FIR
     Returns: the axes.
     """
     scenario, seed = Scenario.of(scenario), whole_number("seed", seed, 0)
-    made = make_policy(policy, scenario) if isinstance(policy, str) else policy
+    name = policy if isinstance(policy, str) else type(policy).__name__
+    (made,) = named_policies(policy if isinstance(policy, str) else {name: policy}, scenario).values()
     heads, targets, estimates, energies = [], [], [], []
     for state, outcome in episodes(made, World(scenario, threads=1), [seed]):
         heads.append(int(state.network.row["head"][0]))
@@ -48,7 +49,6 @@ def plot_episode(policy: str | Policy, scenario: str | Scenario, seed: int = FIR
     axes.plot(*nodes[led].T, "s", color=BLUE, markersize=5, label="heads")
     axes.plot(*truth.T, color=DARK, linewidth=1.6, label="target")
     axes.plot(*believed.T, color=VERMILION, linewidth=1.0, marker=".", markersize=3, label="estimate")
-    name = policy if isinstance(policy, str) else type(policy).__name__
     mean_mj = float(np.mean(energies))
     axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
     axes.set_title(escape_label(f"{scenario.name}, {name}: RMS {rms_m:.3g} m, {mean_mj:.3g} mJ a period"))

@@ -10,7 +10,7 @@ from typing import Any
 from wsn_env.evaluation.comparison import Evaluation
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.front import Fronts, find_fronts
-from wsn_env.evaluation.policies import Policy
+from wsn_env.evaluation.policies import Policy, named_policies
 from wsn_env.evaluation.progress import Progress
 from wsn_env.evaluation.rollout import evaluation_seeds
 from wsn_env.evaluation.versions import versions
@@ -50,7 +50,8 @@ def write_report(
     if evaluation is not None:
         names = ", ".join(evaluation.policies[:3]) + (", ..." if len(evaluation.policies) > 3 else "")
         title = f"{evaluation.scenario.name}: {names}"
-        samples = sample_sections(evaluation, policies, progress) if policies else []
+        made = named_policies(policies, evaluation.scenario) if policies else {}
+        samples = sample_sections(evaluation, made, progress) if made else []
         sections = [*_comparison_sections(evaluation), *sections, *samples]
     return save_report(folder, title, [*sections, settings_section(evaluation, training)])
 
