@@ -1,6 +1,6 @@
 """Pictures of every scenario and of every policy's choice, for the site: frames of the environment itself.
 
-python docs/pictures.py FOLDER    also makes episode.gif, the README's
+python docs/pictures.py FOLDER    also makes episode.gif, the README's, and comparison.png, the landing page's
 """
 
 from __future__ import annotations
@@ -12,12 +12,14 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from wsn_env import Scenario, View, World, make_policy
+from wsn_env import Scenario, View, World, evaluate, make_policy
 from wsn_env.compiled import draws
 from wsn_env.envs.registration import IDS
 from wsn_env.envs.rendering.camera import Camera
 from wsn_env.envs.rendering.palette import BLUE, FLASH, FULL, GREEN, INK, ORANGE, PURPLE, SENSED, SKY, VERMILION, YELLOW
 from wsn_env.envs.rendering.plan import SIZE
+from wsn_env.reports.pictures import write_picture
+from wsn_env.reports.plots import draw_comparison
 
 SEED, PERIODS = 7, 25
 POLICIES = (  # where a policy is at home
@@ -78,6 +80,14 @@ def draw_all(folder: Path) -> None:
             draw(name, policy, path)
 
 
+def compare(path: Path, episodes: int = 1000) -> None:
+    """The landing page's picture of error against energy."""
+    rules = "greedy adaptive pre_dc strongest centroid static_cluster".split()
+    evaluation = evaluate(["ppo", *rules, *(f"nearest{size}" for size in range(7))], "PreDC-v0", 4.0, episodes)
+    write_picture(path, draw_comparison(evaluation, 4.0, emphasis="ppo"))
+
+
 if __name__ == "__main__":
     draw_all(Path(sys.argv[1]))
     film(Path(sys.argv[1]) / "episode.gif")
+    compare(Path(sys.argv[1]) / "comparison.png")

@@ -16,7 +16,8 @@ AGGREGATE = "all"
 
 
 def standard_table(found: Sequence[Scores]) -> str:
-    """Markdown: a line a policy, the best first; an aggregate only of those that act in every scenario."""
+    """Markdown: a line a policy, the best first; an aggregate, with its 95 % interval, of those that act in every
+    scenario."""
     scenarios = list(dict.fromkeys(name for each in found for name in each.blocks))
     whole = {each.policy: each.aggregate() for each in found if len(each.blocks) == len(scenarios)}
 
@@ -25,7 +26,7 @@ def standard_table(found: Sequence[Scores]) -> str:
 
     rows = []
     for each in sorted(found, key=rank, reverse=True):
-        cells = [_cell(each.of(name)) if name in each.blocks else "" for name in scenarios]
+        cells = [f"{each.of(name).mean:.3f}" if name in each.blocks else "" for name in scenarios]
         rows.append([each.policy, _cell(whole[each.policy]) if each.policy in whole else "", *cells])
     return markdown_table(["policy", AGGREGATE, *scenarios], rows)
 
