@@ -6,9 +6,9 @@ import pytest
 import torch
 from stable_baselines3.common.buffers import RolloutBuffer
 
-import train
 from wsn_env.learning.even_worlds import EvenWorldsBuffer
 from wsn_env.learning.sb3 import SB3VecEnv
+from wsn_env.training import trainer as train
 
 SETTINGS = dict(gamma=0.9, gae_lambda=0.8)
 
