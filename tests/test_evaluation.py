@@ -232,3 +232,23 @@ def test_the_best_of_a_family_in_hindsight(tmp_path, capsys):
     assert "best in hindsight: nearest0 of nearest0..8" in capsys.readouterr().out
     save_markdown(evaluation, tmp_path)
     assert (tmp_path / "evaluation.md").read_text().count("best in hindsight") == 2
+
+
+def test_a_long_comparison_is_shown_in_short(capsys, monkeypatch):
+    """The best at the middle trade-off and the one of interest in 80 columns, and a line for each trade-off."""
+    monkeypatch.setenv("COLUMNS", "80")
+    names = [f"nearest{size}" for size in range(9)]
+    evaluation = evaluate([*names, "pre_dc"], SCENARIO, [0.3, 3.0, 30.0], episodes=10)
+    print_tables(evaluation, reference="pre_dc", most=3)
+    shown = capsys.readouterr().out.splitlines()
+    ranked = evaluation.ranked(3.0)
+    wanted = [name for name in ranked if name in (*ranked[:3], "pre_dc")]
+    rows = [line.split()[0] for line in shown if line.strip() and " - policy" not in line and line.split()[0] in ranked]
+    assert rows == wanted and f"{10 - len(wanted)} more: evaluation.md" in shown
+    assert all(len(line.rstrip()) <= 80 for line in shown if not line.startswith("/ref"))
+    for lam in evaluation.lams:
+        best = next(name for name in evaluation.ranked(lam) if name != "pre_dc")
+        own, other = (evaluation.values(name, lam, "return").mean() for name in ("pre_dc", best))
+        (line,) = [line for line in shown if line.startswith(f"lam {lam:g}: ")]
+        ahead = 100 * (own - other) / abs(other)
+        assert f"pre_dc {own:.1f}, best other {best} {other:.1f}: {ahead:+.1f} [" in line

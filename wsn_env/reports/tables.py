@@ -116,7 +116,7 @@ def print_tables(evaluation: Evaluation, reference: str | None = None, most: int
         ranked = evaluation.ranked(lam)
         shown = [policy for policy in ranked if most is None or policy in (*ranked[:most], reference)]
         console.print(_terminal_table(evaluation, lam, reference, shown))
-        notes = [f"{reference} - policy: paired difference of returns, 95 % bootstrap interval; mJ a period"]
+        notes = [f"{reference} - policy: paired difference of returns, 95 % interval; mJ a period"]
         notes += [f"{len(ranked) - len(shown)} more: evaluation.md"] if len(shown) < len(ranked) else []
         notes += describe_best_in_hindsight(evaluation, lam)
         console.print("\n".join(notes), style="dim")
@@ -157,13 +157,12 @@ def _terminal_table(evaluation: Evaluation, lam: float, reference: str, shown: l
 
 
 def _line_of(evaluation: Evaluation, lam: float, reference: str) -> str:
-    """How far a policy is ahead of the best of the others."""
+    """A policy's return beside the best of the others, and how far it is ahead of that [%]."""
     best = next(policy for policy in evaluation.ranked(lam) if policy != reference)
-    own = evaluation.values(reference, lam, "return").mean()
-    ahead = evaluation.difference(reference, best, lam)
-    scale = 100 / max(abs(evaluation.values(best, lam, "return").mean()), 1e-12)
+    own, other = (evaluation.values(policy, lam, "return").mean() for policy in (reference, best))
+    ahead, scale = evaluation.difference(reference, best, lam), 100 / max(abs(other), 1e-12)
     share = format_interval(Summary(*(scale * value for value in (ahead.mean, ahead.low, ahead.high))), 1, "+")
-    return f"lam {lam:g}: {reference} {own:.1f}, ahead of {best}, the best of the others, by {share} %"
+    return f"lam {lam:g}: {reference} {own:.1f}, best other {best} {other:.1f}: {share} %"
 
 
 def format_markdown(evaluation: Evaluation, lam: float, reference: str) -> str:
