@@ -181,6 +181,7 @@ def own_ids():
 def test_an_id_of_ones_own(own_ids):
     for _ in range(2):  # the same again does no harm
         wsn_env.register("test/Mine-v0", scenario="Rssi-v0", lam=2, action="scores", **SMALL)
+        wsn_env.register("test/Placed-v0", positions=np.array([[10.0, 20.0], [30.0, 40.0]]))
     env, envs = gym.make("test/Mine-v0"), gym.make_vec("test/Mine-v0", num_envs=2)
     same = ClusterEnv("Rssi-v0", lam=2, action="scores", **SMALL)
     assert (env.reset(seed=3)[0] == same.reset(seed=3)[0]).all()

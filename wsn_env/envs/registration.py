@@ -42,7 +42,7 @@ def register(id: str, **arguments: Any) -> None:
         raise ValueError(f"id = {id!r:.80}: must be a text NAME-vN, or NAMESPACE/NAME-vN") from None
     ClusterEnv(**arguments).close()
     known = registry.get(id)
-    if known is not None and (known.entry_point, known.kwargs) != (ENTRY_POINT, arguments):
+    if known is not None and (known.entry_point, repr(known.kwargs)) != (ENTRY_POINT, repr(arguments)):
         raise ValueError(f"id {id!r}: is another environment's")
     _register(id, arguments)
 
