@@ -18,8 +18,10 @@ import tyro
 from wsn_env.envs.registration import IDS
 from wsn_env.evaluation import standard
 from wsn_env.evaluation.files import replacing
+from wsn_env.evaluation.policies import make_policy
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.reports.standard_tables import save_standard, standard_table
+from wsn_env.scenario import Scenario
 
 POLICIES = (  # those that act in every scenario; the planner would take days
     *("random", "static_cluster", "centroid", "pre_dc", "strongest", "strongest_signal", "quadrants", "every"),
@@ -49,7 +51,7 @@ def main(arguments: list[str] | None = None) -> int:
     evaluations = []
     for name in asked.scenarios:
         preset = standard.standard_scenario(name)
-        fitting = {label: label for label in POLICIES if fits(label, preset)}
+        fitting = [label for label in POLICIES if fits(label, preset)]
         with progress_bar() as report:
             evaluations.append(
                 standard.play_standard(fitting, name, asked.episodes, asked.out / name, report),
@@ -67,10 +69,10 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def fits(label: str, scenario) -> bool:
+def fits(label: str, scenario: Scenario) -> bool:
     """Whether a policy can act there."""
     try:
-        standard.make_policy(label, scenario)
+        make_policy(label, scenario)
     except ValueError:
         return False
     return True

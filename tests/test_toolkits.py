@@ -130,6 +130,13 @@ def test_a_batch_is_cut_where_it_is_told_to():
     assert infos["episode_rms_m"] == pytest.approx(np.sqrt(squares / 4))
     assert infos["episode_energy_mj"] == pytest.approx(energy)
     assert infos["episode_reference_m"] == pytest.approx(np.sqrt(references / 4))
+    asked = dict(num_envs=2, max_episode_steps=4, action="nodes", **SMALL)
+    awake = gym.make_vec(ID, autoreset_mode=gym.vector.AutoresetMode.DISABLED, **asked)
+    assert gym.make_vec(again(awake.spec)).spec == awake.spec
+    awake.reset(seed=5)
+    for _ in range(4):
+        infos = awake.step(np.ones((2, SMALL["nodes"]), int))[4]
+    assert infos["episode_reference_m"] == pytest.approx(awake.unwrapped.reference_all_awake_m())
     with pytest.raises(ValueError, match="max_episode_steps = 0: must be a whole number, at least 1"):
         gym.make_vec(ID, num_envs=3, max_episode_steps=0)
 

@@ -16,6 +16,7 @@ import tyro
 from wsn_env.envs.registration import IDS
 from wsn_env.evaluation.files import alone_in
 from wsn_env.evaluation.progress import progress_bar
+from wsn_env.evaluation.rollout import Engine
 from wsn_env.models.own import own_error, own_place
 from wsn_env.models.recordings.files import DatasetWarning
 from wsn_env.reports.terminal import NOBODY_READS, any_terminal
@@ -140,21 +141,20 @@ def main(arguments: list[str] | None = None, prog: str = "wsn") -> int:
         arguments: of the command line; None: the process's.
         prog: what messages begin with.
     """
-    runs: dict[type, Callable[[Any], None]] = {
-        Evaluate: run_evaluate,
-        Benchmark: run_benchmark,
-        Training: run_train,
-        Replay: run_replay,
-        Calibrate: run_calibrate,
-        Reproduce: run_reproduce,
-        Compile: run_compile,
+    commands: dict[str, tuple[Any, Callable[[Any], None]]] = {
+        "evaluate": (Evaluate, run_evaluate),
+        "benchmark": (Benchmark, run_benchmark),
+        "train": (Training, run_train),
+        "replay": (Replay, run_replay),
+        "calibrate": (Calibrate, run_calibrate),
+        "reproduce": (Reproduce, run_reproduce),
+        "compile": (Compile, run_compile),
     }
-    commands: dict[str, Callable[..., Any]] = {kind.__name__.lower(): kind for kind in runs if kind is not Training}
-    commands["train"] = Training
+    kinds, runs = {name: kind for name, (kind, _) in commands.items()}, dict(commands.values())
     command: Any = None
     try:
         with any_terminal():
-            command = tyro.extras.subcommand_cli_from_dict(commands, prog="wsn", args=arguments)
+            command = tyro.extras.subcommand_cli_from_dict(kinds, prog="wsn", args=arguments)
             folder = command.out if isinstance(command, (Evaluate, Benchmark, Calibrate)) else None
             with warnings_on_one_line(), nullcontext() if folder is None else alone_in(folder, FILES):
                 runs[type(command)](command)
@@ -195,20 +195,31 @@ def warnings_on_one_line() -> Iterator[None]:
         yield
 
 
+def engine_of(command: Evaluate | Benchmark) -> Engine | None:
+    """Where the episodes are played.
+
+    Raises:
+        ValueError: an address without a cluster.
+    """
+    from wsn_env.evaluation.ray_engine import on_ray
+
+    if command.address and command.engine != "ray":
+        raise ValueError(f"--address {command.address}: only with --engine ray")
+    return on_ray(command.address) if command.engine == "ray" else None
+
+
 def run_evaluate(command: Evaluate) -> None:
     """`wsn evaluate`."""
     from wsn_env.evaluation.comparison import evaluate
     from wsn_env.evaluation.front import check_front_libraries, lam_sweep
     from wsn_env.evaluation.kept_blocks import remove_kept_blocks
     from wsn_env.evaluation.policies import named_policies
-    from wsn_env.evaluation.ray_engine import on_ray
     from wsn_env.reports.front_tables import FRONT_FILES, save_and_print_fronts
     from wsn_env.reports.pages.evaluation_page import write_report
     from wsn_env.reports.pictures import can_draw
     from wsn_env.reports.tables import print_tables, save_markdown
 
-    if command.address and command.engine != "ray":
-        raise ValueError(f"--address {command.address}: only with --engine ray")
+    engine = engine_of(command)
     if command.tracks and Scenario.named(command.scenario).measurement.lasting_errors:
         run_evaluate_recorded(command)
         return
@@ -227,7 +238,7 @@ def run_evaluate(command: Evaluate) -> None:
             command.seed,
             keep=command.out,
             progress=progress,
-            engine=on_ray(command.address) if command.engine == "ray" else None,
+            engine=engine,
         )
     names: list[str] = []
     if command.out:  # first: whatever the terminal is, nothing is lost
@@ -249,21 +260,17 @@ def run_evaluate(command: Evaluate) -> None:
 def run_benchmark(command: Benchmark) -> None:
     """`wsn benchmark`."""
     from wsn_env.evaluation.kept_blocks import remove_kept_blocks
-    from wsn_env.evaluation.policies import label_and_source, named_policies
-    from wsn_env.evaluation.ray_engine import on_ray
+    from wsn_env.evaluation.policies import named_policies
     from wsn_env.evaluation.standard import play_standard, scores, standard_scenario
     from wsn_env.reports.standard_tables import print_standard, save_standard
 
-    if command.address and command.engine != "ray":
-        raise ValueError(f"--address {command.address}: only with --engine ray")
-    policies = dict(map(label_and_source, command.policy))
+    engine = engine_of(command)
     for name in command.scenarios:  # before anything is played
         named_policies(command.policy, standard_scenario(name))
     evaluations = []
     for name in command.scenarios:
-        engine = on_ray(command.address) if command.engine == "ray" else None
         with progress_bar() as progress:
-            evaluation = play_standard(policies, name, command.episodes, command.out / name, progress, engine)
+            evaluation = play_standard(command.policy, name, command.episodes, command.out / name, progress, engine)
         evaluation.save(command.out / name)
         evaluations.append(evaluation)
     found = scores(evaluations)
@@ -286,7 +293,6 @@ def run_train(command: Training) -> None:
 def run_evaluate_recorded(command: Evaluate) -> None:
     """`wsn evaluate --scenario Ble-v0 --tracks FOLDER`."""
     from wsn_env.bluetooth.recorded_evaluation import evaluate_recorded, remove_recorded_blocks
-    from wsn_env.evaluation.ray_engine import on_ray
     from wsn_env.reports.pages.recorded_page import write_recorded_report
     from wsn_env.reports.pictures import can_draw
     from wsn_env.reports.recorded_tables import print_recorded_tables, save_recorded
@@ -303,7 +309,7 @@ def run_evaluate_recorded(command: Evaluate) -> None:
             command.seed,
             keep=command.out,
             progress=progress,
-            engine=on_ray(command.address) if command.engine == "ray" else None,
+            engine=engine_of(command),
             calibrated=any(pair.startswith("calibration=") for pair in command.set),
         )
     names: list[str] = []

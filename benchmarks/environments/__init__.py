@@ -2,3 +2,5 @@
 
 The action is the number of members beside the head, who is the living node nearest to the predicted position.
 """
+
+FURTHER = 8  # members beside the head, at most

@@ -8,10 +8,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from benchmarks.environments import FURTHER
 from benchmarks.filters.problem import constant_velocity
 from wsn_env.scenario import Scenario
 
-FURTHER = 8  # members beside the head, at most
 CANDIDATES = 12
 
 

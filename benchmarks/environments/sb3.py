@@ -6,10 +6,9 @@ import gymnasium as gym
 import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 
+from benchmarks.environments import FURTHER
 from benchmarks.environments.naive import NaiveEnv
 from wsn_env.scenario import Scenario
-
-FURTHER = 8  # members beside the head, at most
 
 
 class TextbookEnv(gym.Env):

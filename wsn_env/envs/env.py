@@ -72,7 +72,9 @@ class ClusterEnv(gym.Env):
         self.scenario: Scenario = scenario_of(scenario, overrides, type(self))
         self._camera = None if render_mode is None else Camera(self.scenario, render_mode, frame_px)
         self.interface: Interface = Interface(self.scenario, Settings(action, observation, reward, order, candidates))
-        self._tells_mask: bool = action_mask and self.interface.check_masks(action)
+        self._tells_mask: bool = action_mask
+        if action_mask:
+            self.interface.check_masks(action)
         self.world: World = World(self.scenario, threads=1, fast=fast)
         self.render_mode: RenderMode | None = render_mode
         self.action_space: gym.Space[Any] = self.interface.action.space

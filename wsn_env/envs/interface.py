@@ -69,15 +69,10 @@ class Interface:
         self._counted = scenario.counted_m
         self._reference = scenario.reference_error_m, scenario.reference_energy_mj
 
-    def check_masks(self, name: ActionName) -> bool:
-        """True.
-
-        Raises:
-            ValueError: the action of this name has no masks.
-        """
+    def check_masks(self, name: ActionName) -> None:
+        """Raise ValueError if the action, of this name, has no masks."""
         if isinstance(self.action.space, Box):
             raise ValueError(f"action_mask = True: action {name!r} is of numbers and has no masks")
-        return True
 
     def most_probable(self, logits: np.ndarray, view: View) -> Cluster:
         """The clusters of the most probable actions.

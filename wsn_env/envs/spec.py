@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
+from enum import Enum
 from os import PathLike, fspath
 from typing import Any
 
@@ -34,6 +35,8 @@ def _plain(value: Any) -> Any:
         return _plain(value.as_dict())
     if isinstance(value, Section):
         return _plain(section_as_dict(value))
+    if isinstance(value, Enum):  # an autoreset mode
+        return value.value
     if isinstance(value, Mapping):
         return {name: _plain(each) for name, each in value.items()}
     if isinstance(value, (np.ndarray, np.generic)):

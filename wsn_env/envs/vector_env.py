@@ -81,7 +81,9 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self.world: World = World(self.scenario, threads, fast)
         settings = Settings(action, observation, reward, order, candidates)
         self.interface: Interface = Interface(self.scenario, settings, self.world.threads)
-        self._tells_mask: bool = action_mask and self.interface.check_masks(action)
+        self._tells_mask: bool = action_mask
+        if action_mask:
+            self.interface.check_masks(action)
         periods = self.scenario.periods
         if max_episode_steps is not None:
             periods = min(periods, whole_number("max_episode_steps", max_episode_steps, 1 + self.scenario.unscored))
@@ -106,7 +108,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self._ended = np.zeros(self.num_envs, dtype=bool)
         self._reference = None
         if has_reference(self.scenario):
-            self._reference = Reference(self.scenario, self.num_envs, self.world.threads)
+            self._reference = Reference(self.scenario, self.num_envs, self.world.threads, self._horizon)
 
     @one_thread
     def reset(
@@ -215,8 +217,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         if self.scenario.ends_outside:
             info["reward_rest"] = self._charge_rest(0.0, rows)[1]
         if self._reference is not None:
-            share = self._horizon / self.scenario.periods  # that is played
-            info["episode_reference_m"] = self._reference.episode_m() / np.sqrt(share)
+            info["episode_reference_m"] = self._reference.episode_m()
         return info
 
     def _charge_rest(self, reward: Any, rows: np.ndarray) -> tuple[Any, np.ndarray]:

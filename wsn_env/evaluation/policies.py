@@ -90,10 +90,10 @@ def named_policies(texts: str | Iterable[str] | Mapping[str, Policy], scenario: 
         ValueError: for an unknown policy, two with one label, a label that is not one line of text, or none at all.
     """
     if isinstance(texts, Mapping):
-        named = dict(texts)
-        for label, given in texts.items():
-            made_for = getattr(given, "for_scenario", None)
-            named[label] = made_for(scenario) if callable(made_for) else given
+        named = {
+            label: given.for_scenario(scenario) if hasattr(given, "for_scenario") else given
+            for label, given in dict[str, Any](texts).items()
+        }
         for label, policy in named.items():
             if isinstance(policy, type) or not callable(getattr(policy, "act", None)):
                 raise ValueError(f"policies[{label!r}] = {short(repr(policy))}: must be a policy, with act(view)")
@@ -104,7 +104,7 @@ def named_policies(texts: str | Iterable[str] | Mapping[str, Policy], scenario: 
         for text in dict.fromkeys([texts] if isinstance(texts, str) else texts):
             if not isinstance(text, str):
                 raise ValueError(f"policies: {_NO_NAME.format(type(text).__name__)}")
-            label, source = label_and_source(text)
+            label, source = _label_and_source(text)
             policy = make_policy(source, scenario)
             if label in named:
                 raise ValueError(f"policies: {label!r} is there twice: labels must differ")
@@ -120,7 +120,7 @@ def named_policies(texts: str | Iterable[str] | Mapping[str, Policy], scenario: 
 _NO_NAME = "{} is no name: give policies of your own as {{name: policy}}"
 
 
-def label_and_source(text: str) -> tuple[str, str]:
+def _label_and_source(text: str) -> tuple[str, str]:
     """("ppo", "runs/mine/policy.json") from "ppo=runs/mine/policy.json"; a name or a path alone is its own label."""
     label, equals, source = text.partition("=")
     labelled = equals and ":" not in label  # else parameters: quadrants:n=2

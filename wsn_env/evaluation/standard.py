@@ -13,7 +13,7 @@ bootstrap of blocks within each scenario.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -25,7 +25,7 @@ from scipy.stats import trim_mean
 from wsn_env.envs.registration import IDS
 from wsn_env.evaluation.comparison import Evaluation, evaluate
 from wsn_env.evaluation.intervals import RESAMPLES, Summary
-from wsn_env.evaluation.policies import Policy, make_policy
+from wsn_env.evaluation.policies import Policy
 from wsn_env.evaluation.progress import Progress
 from wsn_env.evaluation.rollout import BLOCK, Engine
 from wsn_env.models.quantity import suggest
@@ -34,8 +34,6 @@ from wsn_env.scenario import Scenario
 SEED, EPISODES = 9000, 1000
 RANDOM = "random"
 REFERENCES = Path(__file__).with_name("standard.json")
-
-Maker = Callable[[Scenario], Policy]
 
 
 @dataclass(frozen=True)
@@ -91,7 +89,7 @@ def standard_lams(scenario: Scenario) -> tuple[float, ...]:
 
 
 def play_standard(
-    policies: Mapping[str, str | Maker],
+    policies: str | Sequence[str] | dict[str, Policy],
     scenario: str,
     episodes: int = EPISODES,
     keep: Path | None = None,
@@ -101,10 +99,9 @@ def play_standard(
     """Play the benchmark's episodes in one scenario.
 
     Args:
-        policies: by label, names as `make_policy` takes them, or what makes one for a scenario.
+        policies, keep, progress, engine: as `evaluate`'s.
         scenario: an id.
         episodes: how many of the 1,000: whole blocks of 50.
-        keep, progress, engine: as `evaluate`'s.
 
     Raises:
         ValueError: a policy cannot act there.
@@ -112,12 +109,9 @@ def play_standard(
     if episodes % BLOCK or not 0 < episodes <= EPISODES:
         raise ValueError(f"episodes = {episodes}: must be a multiple of {BLOCK}, at most {EPISODES}")
     preset = standard_scenario(scenario)
-    made = {
-        label: make_policy(given, preset) if isinstance(given, str) else given(preset)
-        for label, given in policies.items()
-    }
-    lams = standard_lams(preset)
-    return evaluate(made, preset, lams, episodes, SEED, keep=keep, progress=progress, engine=engine)
+    return evaluate(
+        policies, preset, standard_lams(preset), episodes, SEED, keep=keep, progress=progress, engine=engine
+    )
 
 
 def block_returns(evaluation: Evaluation, policy: str, lam: float) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +15,6 @@ from wsn_env.reports.pictures import escape_label
 from wsn_env.reports.plots import axes_of
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.world import World
-
-if TYPE_CHECKING:
-    pass
 
 
 @checked_but("policy", "seed")

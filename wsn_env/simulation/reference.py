@@ -64,17 +64,18 @@ class Reference:
     `begin` at the start of an episode, then `advance` once a period; `episode_m` and `all_awake_m` at its end.
     """
 
-    def __init__(self, scenario: Scenario, rows: int = 1, threads: int = 1) -> None:
+    def __init__(self, scenario: Scenario, rows: int = 1, threads: int = 1, periods: int | None = None) -> None:
         """Prepare.
 
         Args:
             scenario: one that `has_reference`.
             rows: B.
             threads: at most so many share the work. No bit depends on it.
+            periods: of an episode; None: the scenario's.
         """
         if why := why_no_reference(scenario):
             raise ValueError(why)
-        self._periods, self._threads = scenario.periods, threads
+        self._periods, self._threads = scenario.periods if periods is None else periods, threads
         self._constants, self._start = constants(scenario), start_record(scenario)
         self._constants["tracking"]["q"] = scenario.track_q
         if scenario.detection.values_decide:
@@ -125,7 +126,8 @@ class Reference:
         """
         rows = np.ones(state.rows, bool) if rows is None else np.asarray(rows, bool)
         memory, threads = np.zeros(len(rows), MEMORY), threads_for(rows, self._threads)
-        over_rows(_play_all_awake, len(rows), threads, self._constants, self._start, rows, state.handle, memory)
+        asked = self._start, rows, self._periods
+        over_rows(_play_all_awake, len(rows), threads, self._constants, asked, state.handle, memory)
         return np.sqrt(memory["squares"] / self._periods)
 
 
@@ -153,9 +155,9 @@ def _advance(start, stop, cs, outcomes, handle, memory, reference_m):
 
 
 @lean_kernel
-def _play_all_awake(start, stop, cs, starts, rows, handle, memory):
+def _play_all_awake(start, stop, cs, asked, handle, memory):
     """A whole episode with all nodes awake, in the rows marked; `memory` holds what the last period leaves."""
-    state, c = state_at(handle), cs[0]
+    (starts, rows, periods), state, c = asked, state_at(handle), cs[0]
     for b in range(start, stop):
         if not rows[b]:
             continue
@@ -164,7 +166,7 @@ def _play_all_awake(start, stop, cs, starts, rows, handle, memory):
         if starts[0].searches:
             xx, xy, yy = _information_of_all(state, b, 0, c)
             _correct(own.cov, xx, xy, yy)
-        for k in range(1, state.track.shape[1]):
+        for k in range(1, periods + 1):
             xx, xy, yy = _information_of_all(state, b, k, c)
             _take_period(own, xx, xy, yy, c)
 
