@@ -41,6 +41,7 @@ FAULTS = [  # that a policy is trained with, beside those of none in fewer and i
 
 MAKERS: dict[str, list[list[str]]] = {  # arguments of Python, one command after the other; {out}: its folder
     "reproduce": [["-m", "wsn_env", "reproduce", "all", "--out", "{out}"]],
+    "reference": [["docs/reference_tables.py", "--out", "{out}"]],
     "tables": [["-m", "studies.tables", "--out", "{out}"]],
     "bound": [["-m", "studies.bound", "--out", "{out}"]],
     "leaderboard": [["-m", "studies.leaderboard", "--out", "{out}"]],

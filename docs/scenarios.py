@@ -21,11 +21,11 @@ PAGE = """# {name}
 |---|---|
 | make | `{make}`, native batch: `{make_vec}` |
 | nodes report | {measurement} |
-| action | `Discrete(28)`, the menu; others by `action=` ([all](../../environment.md#action)) |
-| observation | `"candidates"`, a flat `Box`; others by `observation=` ([all](../../environment.md#observation)) |
-| reward | minus (error [m] + lam x energy [mJ]) of the period ([more](../../environment.md#reward)) |
+| action | `Discrete(28)`; others by `action=` ([all](../../reference.md#actions)) |
+| observation | `"candidates"`, a flat `Box`; others by `observation=` ([all](../../reference.md#observations)) |
+| reward | minus (error [m] + lam x energy [mJ]) of the time step ([more](../../environment.md#reward)) |
 | start | {start} |
-| end | truncated after {periods} periods; never terminated |
+| end | truncated after {periods} time steps; never terminated |
 
 ## Arguments
 

@@ -135,8 +135,8 @@ def table_of_volumes(evaluation: Evaluation, trained) -> str:
     rules = join_points(points for name, points in by_policy.items() if name not in trained)
     rows = []
     for name in trained:
-        own, theirs = hypervolumes({name: by_policy[name], "rules": rules}, reference)
-        ahead = theirs.difference
+        theirs, own = hypervolumes({"rules": rules, name: by_policy[name]}, reference)
+        ahead = own.difference
         difference = f"{ahead.mean:+.4f} [{ahead.low:+.4f}, {ahead.high:+.4f}]"
         rows.append([name, f"{own.hypervolume.mean:.4f}", difference])
     rows.append(["all rules together", f"{theirs.hypervolume.mean:.4f}", ""])

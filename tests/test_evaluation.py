@@ -243,7 +243,7 @@ def test_a_long_comparison_is_shown_in_short(capsys, monkeypatch):
     shown = capsys.readouterr().out.splitlines()
     ranked = evaluation.ranked(3.0)
     wanted = [name for name in ranked if name in (*ranked[:3], "pre_dc")]
-    rows = [line.split()[0] for line in shown if line.strip() and " - policy" not in line and line.split()[0] in ranked]
+    rows = [line.split()[0] for line in shown if line.strip() and "to pre_dc" not in line and line.split()[0] in ranked]
     assert rows == wanted and f"{10 - len(wanted)} more: evaluation.md" in shown
     assert all(len(line.rstrip()) <= 80 for line in shown if not line.startswith("/ref"))
     for lam in evaluation.lams:

@@ -147,7 +147,7 @@ def halfway():
 
 
 def test_what_observations_tell_of_energy_is_what_plain_numpy_finds(halfway):
-    view, first = halfway, len(BELIEF_FEATURES + MOTION_FEATURES)
+    view, first = halfway, len(BELIEF_FEATURES | MOTION_FEATURES)
     for name in ("menu", "candidates"):
         told = make_observation(name, POOR, "nearest", 12).encode(view)[:, first : first + len(ENERGY_FEATURES)]
         told = dict(zip(ENERGY_FEATURES, told.T))
@@ -207,7 +207,7 @@ def test_where_energy_is_not_scarce_observations_are_as_ever():
     scenario = POOR.override(scarce_energy=False)
     view = View.of(World(scenario).reset([draws.key_of_seed(3)]))
     more, less = (make_observation("menu", each, "nearest", 12).encode(view)[0] for each in (POOR, scenario))
-    belief = len(BELIEF_FEATURES + MOTION_FEATURES)
+    belief = len(BELIEF_FEATURES | MOTION_FEATURES)
     assert (more[:belief] == less[:belief]).all()
     entries = more[belief + len(ENERGY_FEATURES) :].reshape(MENU_ENTRIES, -1)[:, : len(ENTRY_FEATURES)]
     assert (entries == less[belief:].reshape(MENU_ENTRIES, -1)).all()

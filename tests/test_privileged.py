@@ -86,8 +86,8 @@ def constant_network(scenario: Scenario, interface: train.Settings, entry_weight
     envs = ClusterVectorEnv(1, scenario, observation="menu", order=interface.order)
     belief, width = envs.interface.observation.belief, envs.interface.observation.shape[1]
     entry = np.zeros((width, 2))
-    entry[ENTRY_FEATURES.index("members"), 0] = entry_weight
-    entry[ENTRY_FEATURES.index("head_detection"), 0] = 1.0
+    entry[list(ENTRY_FEATURES).index("members"), 0] = entry_weight
+    entry[list(ENTRY_FEATURES).index("head_detection"), 0] = 1.0
     arrays = {
         "belief.weight": np.zeros((belief, 2)),
         "belief.bias": np.full(2, 5.0),

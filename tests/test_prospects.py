@@ -20,7 +20,7 @@ ENTRIES = (0, 1, 3, 6, 10, 12, 15, 19, 22)  # as it is; head kept, moved to the 
 def prospects(scenario, view, order="nearest"):
     """(B, 28) of each feature by name."""
     observation = Interface(scenario, Settings(observation="menu", order=order)).observation
-    entries = observation.encode(view)[:, len(BELIEF_FEATURES + MOTION_FEATURES) :].reshape(
+    entries = observation.encode(view)[:, len(BELIEF_FEATURES | MOTION_FEATURES) :].reshape(
         len(view.row), MENU_ENTRIES, -1
     )
     return dict(zip(ENTRY_FEATURES, np.moveaxis(entries, 2, 0)))

@@ -127,7 +127,8 @@ def test_the_pages_small_tables_are_what_is_measured(tmp_path):
     """A tenth of the episodes; those of shipped policies have a test of their own (test_pretrained.py)."""
     names = ["reference_points", "honesty", "silence", "motions", "anchors"]
     tables.main(["--episodes", "40", "--only", *names, "--out", str(tmp_path)])
-    check_tables("environment.md", "tables", tmp_path, share=0.1)
+    check_tables("filters.md", "tables", tmp_path, share=0.1)
+    check_tables("comparing.md", "tables", tmp_path, share=0.1)
     check_tables("results.md", "tables", tmp_path, share=0.1)
 
 
@@ -165,4 +166,4 @@ def test_every_fault_is_played_at_three_strengths(tmp_path, monkeypatch):
 def test_particles(tmp_path, capsys):
     assert particles.main(["--episodes", "40", "--out", str(tmp_path)]) == 0
     assert (tmp_path / "particles.md").read_text().strip() in capsys.readouterr().out
-    check_tables("environment.md", "particles", tmp_path, share=40 / 500)
+    check_tables("filters.md", "particles", tmp_path, share=40 / 500)

@@ -168,8 +168,8 @@ def test_the_page_tells_every_key_of_an_info():
     env.reset(seed=0)
     for _ in range(SMALL["periods"]):
         keys |= set(env.step(13)[4])
-    page = (Path(__file__).parents[1] / "docs" / "environment.md").read_text()
-    section = page[page.index("`info` carries the truth") : page.index("## Reference and bound")]
+    page = (Path(__file__).parents[1] / "docs" / "reference.md").read_text()
+    section = page[page.index("## Info") : page.index("## Meaning of lam")]
     rows = [line.split("|")[1] for line in section.splitlines() if line.startswith("| `")]
     assert {name for row in rows for name in re.findall(r"`(\w+)`", row)} == keys
 

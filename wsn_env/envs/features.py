@@ -7,59 +7,59 @@ import numpy as np
 from wsn_env.compiled.elementary import log
 from wsn_env.compiled.kernels import lean_piece
 from wsn_env.envs.expectations import Outlook
+from wsn_env.envs.feature import BOUND, Feature, amount, flag, share
 from wsn_env.envs.merit import gain, position_cov, squared_between
 from wsn_env.envs.scarcity import ENERGY_FEATURES, describe_energy
 from wsn_env.models.motion.modes import COUNT, MODES
 from wsn_env.scenario import Scenario
 
-BELIEF_FEATURES = (
-    "lam",  # log, halved
-    "major_sd",  # log of the position ellipse's axes
-    "minor_sd",
-    "major_radii",  # the same in sensing radii
-    "minor_radii",
-    "axis_cos",  # twice the angle between the major axis and the velocity
-    "axis_sin",
-    "speed",  # m/s
-    "velocity_sd",  # log
-    "silence",  # log probability of the silence since the last report
-    "heard",  # reports in the last period
-    "head_ahead",  # where the head stands, in radii along and across the velocity
-    "head_left",
-    "head_distance",
-    "head_detection",
-    "head_nearest",  # 1: no living node is nearer
-    "members",
-    "joint_detection",  # of the standing cluster
-    "sparseness",  # distance of the ninth nearest candidate
-)
-MOTION_FEATURES = (  # behind them
-    "surprise",  # log, halved
-    *(mode.name for mode in MODES),  # probabilities of the filter's modes; in the long run, where it has none
-)
-CANDIDATE_FEATURES = (
-    "ahead",  # in radii along and across the velocity, from the prediction
-    "left",
-    "distance",
-    "detection",
-    "head_distance",
-    "member",
-    "head",
-    "battery",  # share left
-    "gain",  # log of the trace's expected drop by this node alone
-    "merit",  # 1 for the first in the greedy order of information after the head, 1/2, 1/3, ...; 0 for the head
-    "merit_drop",  # drop of the expected sd that it brings there, as a share of the prediction's
-)
+BELIEF_FEATURES = {
+    "lam": Feature("trade-off of the episode", "ln m/mJ, / 2"),
+    "major_sd": Feature("sd of the predicted position along the longer axis of its ellipse", "ln m"),
+    "minor_sd": Feature("the same along the shorter axis", "ln m"),
+    "major_radii": amount("sd along the longer axis", "radius"),
+    "minor_radii": amount("sd along the shorter axis", "radius"),
+    "axis_cos": Feature("cosine of twice the angle between the longer axis and the velocity", "", -1.0, 1.0),
+    "axis_sin": Feature("sine of the same", "", -1.0, 1.0),
+    "speed": amount("predicted speed", "m/s"),
+    "velocity_sd": Feature("root of the trace of the predicted velocity's covariance", "ln m/s"),
+    "silence": Feature("probability of hearing nothing since the last report", "ln / 5", high=0.0),
+    "heard": amount("reports that came in the last time step", "4 reports"),
+    "head_ahead": Feature("where the head stands from the prediction, along the velocity", "radius"),
+    "head_left": Feature("the same across it, to the left", "radius"),
+    "head_distance": amount("distance of the head to the prediction", "radius"),
+    "head_detection": share("probability that the head detects the target"),
+    "head_nearest": flag("1: no living node is nearer to the prediction than the head"),
+    "members": amount("members of the present cluster, without the head", "4 nodes"),
+    "joint_detection": share("probability that a node of the present cluster detects the target"),
+    "sparseness": amount("distance of the ninth nearest candidate to the prediction", "radius"),
+}
+MOTION_FEATURES = {  # behind them
+    "surprise": Feature("how far reports have moved the estimate of late, squared, over what was expected", "ln / 2"),
+    **{mode.name: share(f"probability of the filter's mode of motion: {mode.name}") for mode in MODES},
+}
+CANDIDATE_FEATURES = {
+    "ahead": Feature("where the node stands from the prediction, along the velocity", "radius"),
+    "left": Feature("the same across it, to the left", "radius"),
+    "distance": amount("distance to the prediction; 10: no such node", "radius"),
+    "detection": share("probability that the node detects the target"),
+    "head_distance": amount("distance to the present head", "radius"),
+    "member": flag("1: in the present cluster"),
+    "head": flag("1: its head"),
+    "battery": share("energy left, as a share of a full battery"),
+    "gain": Feature("expected drop of the position variance by this node alone, as a share of it", "ln / 4", high=0.0),
+    "merit": share("1 / place in the greedy order of information behind the head; 0: the head"),
+    "merit_drop": share("drop of the expected sd that the node brings in that order, as a share of the predicted sd"),
+}
 WIDTH = len(CANDIDATE_FEATURES)
-G = len(BELIEF_FEATURES)
-BOUND = 10.0
+G, E = len(BELIEF_FEATURES), len(ENERGY_FEATURES)
 LEAST_SURPRISE = 0.01
 NINTH = 9
 
 
-def belief_features(scenario: Scenario) -> tuple[str, ...]:
-    """What observations tell of a row's belief and of how the target moves; of its energy where that is scarce."""
-    return BELIEF_FEATURES + MOTION_FEATURES + (ENERGY_FEATURES if scenario.scarce_energy else ())
+def belief_features(scenario: Scenario) -> dict[str, Feature]:
+    """What observations tell of an environment's belief and of how its target moves; of energy where that is scarce."""
+    return BELIEF_FEATURES | MOTION_FEATURES | (ENERGY_FEATURES if scenario.scarce_energy else {})
 
 
 class Heading(NamedTuple):
@@ -116,8 +116,8 @@ def describe_row(known: Any, b: int, outlook: Outlook, c: Any, f: np.ndarray) ->
     for k in range(COUNT):
         f[G + 1 + k] = belief.mode_probabilities[k]
     if c.scarce_energy:
-        describe_energy(known, b, c, f[end : end + len(ENERGY_FEATURES)])
-        end += len(ENERGY_FEATURES)
+        describe_energy(known, b, c, f[end : end + E])
+        end += E
     return heading, end
 
 

@@ -10,12 +10,12 @@ import numpy as np
 from gymnasium import spaces
 
 from wsn_env.compiled.kernels import Pinned, bind, every_row, kernel, lean_piece, over_rows, threads_for
-from wsn_env.envs import features
 from wsn_env.envs.actions import GROUP, MENU_ENTRIES
 from wsn_env.envs.expectations import REPORTS, REPORTS_AHEAD, Expectations, Expected, outlook_of
+from wsn_env.envs.feature import BOUND, Feature
 from wsn_env.envs.features import (
-    BOUND,
     CANDIDATE_FEATURES,
+    WIDTH,
     belief_features,
     clip,
     describe_candidate,
@@ -84,7 +84,7 @@ def _encode_candidates_of(b, c, known, found, ranking, out):
     own = f[first:]
     own[:] = 0.0
     for k in range(candidates):
-        g = own[k * features.WIDTH : (k + 1) * features.WIDTH]
+        g = own[k * WIDTH : (k + 1) * WIDTH]
         if outlook.nodes[k].node < 0:
             g[2] = BOUND
         else:
@@ -126,15 +126,22 @@ def _encode_menu_of(b, c, known, by, found, ranking, out):
 
 
 class CandidatesObservation:
-    """Flat Box float32: `belief_features`, then CANDIDATE_FEATURES of the K living nodes nearest to the prediction."""
+    """Flat Box float32: `belief_features`, then CANDIDATE_FEATURES of the K living nodes nearest to the prediction.
+
+    `features` has a name, a meaning, a unit and a range for each column.
+    """
 
     depth, kernel = REPORTS, _encode_candidates
     _more: tuple[Any, ...] = ()  # what the kernel wants beside
 
     def __init__(self, scenario: Scenario, order: Order, candidates: int, threads: int = 1) -> None:
-        self.belief: int = len(belief_features(scenario))
-        self.shape: tuple[int, int] = self._shape(scenario, candidates)
-        size = self.belief + self.shape[0] * self.shape[1]
+        about_belief, (count, each) = belief_features(scenario), self._choices(scenario, candidates)
+        self.belief: int = len(about_belief)
+        self.shape: tuple[int, int] = count, len(each)
+        self.features: dict[str, Feature] = about_belief | {
+            f"{name}[{k}]": feature for k in range(count) for name, feature in each.items()
+        }
+        size = self.belief + count * len(each)
         self.space: spaces.Box = spaces.Box(-BOUND, BOUND, (size,), np.float32)
         self._candidates, self._threads = candidates, threads
         self.expectations: Expectations = Expectations(scenario, candidates, threads)
@@ -142,8 +149,8 @@ class CandidatesObservation:
         self._encode = Pinned(self.kernel)
 
     @staticmethod
-    def _shape(scenario: Scenario, candidates: int) -> tuple[int, int]:
-        return candidates, len(CANDIDATE_FEATURES)
+    def _choices(scenario: Scenario, candidates: int) -> tuple[int, dict[str, Feature]]:
+        return candidates, CANDIDATE_FEATURES
 
     def encode(self, view: View) -> np.ndarray:
         """(B, n) float32, fresh."""
@@ -216,8 +223,8 @@ class MenuObservation(CandidatesObservation):
         self._more = (ORDERS.index(order),)
 
     @staticmethod
-    def _shape(scenario: Scenario, candidates: int) -> tuple[int, int]:
-        return MENU_ENTRIES, len(entry_features(scenario))
+    def _choices(scenario: Scenario, candidates: int) -> tuple[int, dict[str, Feature]]:
+        return MENU_ENTRIES, entry_features(scenario)
 
 
 @dataclass

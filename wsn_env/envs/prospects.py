@@ -7,39 +7,40 @@ import numpy as np
 from wsn_env.compiled.elementary import expected_error, log
 from wsn_env.compiled.kernels import lean_piece
 from wsn_env.envs.expectations import Outlook
+from wsn_env.envs.feature import Feature, amount, flag, share
 from wsn_env.envs.features import Heading
 from wsn_env.envs.merit import PositionCov, gain, position_cov, report_way, squared_between
 from wsn_env.models.radio.base import reception, transmission
 from wsn_env.scenario import Scenario
 
-ENTRY_FEATURES = (
-    "standing",  # 1: the cluster as it is
-    "moves",  # 1: the head's role goes to the best node
-    "members",  # further ones
-    "invited",  # of them, who sleep
-    "sd",  # log of the expected root of the position covariance's trace
-    "sd_drop",  # log of its ratio to the prediction's
-    "error_cost",  # expected error, in a learner's unit of cost
-    "energy_cost",  # lam times expected energy, in the same
-    "energy",  # its root, in roots of what the scenario calls typical
-    "detections",  # expected
-    "silence",  # probability that no report comes
-    "hold",  # probability of a detection AHEAD periods on, if the target keeps its velocity
-    "head_ahead",  # where the head stands, in radii along and across the velocity
-    "head_left",
-    "head_distance",
-    "head_detection",
-)
-ENERGY_FEATURES = (  # behind them, where energy is scarce
-    "head_energy",  # share of its battery
-    "least_energy",  # of the battery of the node that has least
-)
-WIDTH = len(ENTRY_FEATURES)
+ENTRY_FEATURES = {
+    "standing": flag("1: keeps the present cluster"),
+    "moves": flag("1: another node becomes the head"),
+    "members": amount("members, without the head", "4 nodes"),
+    "invited": amount("those of them that sleep now and are invited", "4 nodes"),
+    "sd": Feature("expected root of the trace of the position covariance after the reports", "ln m"),
+    "sd_drop": Feature("the same over that of the prediction", "ln", high=0.0),
+    "error_cost": amount("expected error", "typical cost"),
+    "energy_cost": amount("lam times the expected energy", "typical cost"),
+    "energy": amount("root of the expected energy over the scenario's `typical_energy_mj`"),
+    "detections": amount("expected number of nodes that detect", "4 nodes"),
+    "silence": share("probability that no report comes"),
+    "hold": share("probability that a node of it detects three time steps on, if the target keeps its velocity"),
+    "head_ahead": Feature("where the head would stand from the prediction, along the velocity", "radius"),
+    "head_left": Feature("the same across it, to the left", "radius"),
+    "head_distance": amount("distance of that head to the prediction", "radius"),
+    "head_detection": share("probability that it detects the target"),
+}
+ENERGY_FEATURES = {  # behind them, where energy is scarce
+    "head_energy": share("energy left in the head, as a share of its battery"),
+    "least_energy": share("the same of the node of the cluster that has least"),
+}
+WIDTH, MORE = len(ENTRY_FEATURES), len(ENERGY_FEATURES)
 
 
-def entry_features(scenario: Scenario) -> tuple[str, ...]:
-    """What observations tell of an entry of the menu."""
-    return ENTRY_FEATURES + (ENERGY_FEATURES if scenario.scarce_energy else ())
+def entry_features(scenario: Scenario) -> dict[str, Feature]:
+    """What observations tell of a discrete action: its predicted outcome."""
+    return ENTRY_FEATURES | (ENERGY_FEATURES if scenario.scarce_energy else {})
 
 
 class Units(NamedTuple):
@@ -108,7 +109,7 @@ def describe_entries(
         head = nodes[leader].node
         tally = _with_head(tally, outlook, leader, c.radio)
     slot, invited = 0, 0
-    width = WIDTH + (len(ENERGY_FEATURES) if c.scarce_energy else 0)
+    width = WIDTH + (MORE if c.scarce_energy else 0)
     for n in range(len(entries) // width):
         f = entries[n * width : (n + 1) * width]
         f[:] = 0.0

@@ -6,19 +6,20 @@ import numpy as np
 
 from wsn_env.compiled.elementary import exp, log
 from wsn_env.compiled.kernels import kernel, lean_piece
+from wsn_env.envs.feature import Feature, share
 from wsn_env.models.state import knowledge_at
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.constants import common_constants
 from wsn_env.simulation.geometry import energy_about
 from wsn_env.simulation.view import View
 
-ENERGY_FEATURES = (  # of a row, behind those of its belief
-    "time_left",  # share of the horizon
-    "energy_left",  # share of all batteries
-    "supply",  # log of the energy left, in what a typical schedule spends in the time left; a quarter of it
-    "supply_near",  # the same of the nodes about the prediction, and the time that the target will spend there
-    "supply_ahead",  # the same where it will be FAR_AHEAD periods on, if it keeps its velocity
-)
+ENERGY_FEATURES = {  # behind those of the belief
+    "time_left": share("time steps left, as a share of the horizon"),
+    "energy_left": share("energy left in all nodes, as a share of their batteries"),
+    "supply": Feature("energy left over what a typical schedule spends in the time left", "ln / 4"),
+    "supply_near": Feature("the same of nodes about the prediction and of the target's time there", "ln / 4"),
+    "supply_ahead": Feature("the same where it will be 15 time steps on, if it keeps its velocity", "ln / 4"),
+}
 FAR_AHEAD = 15.0
 LEAST_SUPPLY = 1e-6
 LEAST, MOST = 1e-3, 1e3  # prices [m/mJ]

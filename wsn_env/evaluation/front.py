@@ -57,7 +57,7 @@ Fronts = dict[str, list[Point]]
 
 @dataclass(frozen=True)
 class Volume:
-    """A front's hypervolume [m mJ], and how far the first front's exceeds it (None for the first)."""
+    """A front's hypervolume [m mJ], and how far it exceeds the first front's (None for the first)."""
 
     front: str
     hypervolume: Summary
@@ -160,7 +160,7 @@ def hypervolumes(fronts: Fronts, reference: tuple[float, float]) -> list[Volume]
         Volume(
             name,
             Summary.around(whole[i], resampled[:, i]),
-            Summary.around(whole[0] - whole[i], resampled[:, 0] - resampled[:, i]) if i else None,
+            Summary.around(whole[i] - whole[0], resampled[:, i] - resampled[:, 0]) if i else None,
         )
         for i, name in enumerate(fronts)
     ]
@@ -187,7 +187,7 @@ def save_front(evaluation: Evaluation, fronts: Fronts, volumes: list[Volume], ou
         "reference": {"error_m": error_m, "energy_mj": energy_mj},
         "hypervolumes": [
             {"front": volume.front, "hypervolume": vars(volume.hypervolume)}
-            | ({} if volume.difference is None else {f"{volumes[0].front} minus it": vars(volume.difference)})
+            | ({} if volume.difference is None else {"difference_to_first": vars(volume.difference)})
             for volume in volumes
         ],
     }

@@ -7,7 +7,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from wsn_env.envs.features import BOUND
+from wsn_env.envs.feature import BOUND
 from wsn_env.envs.vector_env import ClusterVectorEnv
 from wsn_env.models.arguments import checked
 

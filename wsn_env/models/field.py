@@ -10,7 +10,7 @@ import numpy as np
 
 from wsn_env.compiled import draws
 from wsn_env.compiled.kernels import lean_kernel, lean_piece, piece
-from wsn_env.models.quantity import ScenarioError, Section, quantity
+from wsn_env.models.quantity import ScenarioError, Section, described, quantity
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,9 @@ class Field(Section):
         whole=True,
         optional=True,
     )
-    positions: tuple[tuple[float, float], ...] | None = None  # m; given nodes instead of drawn ones
+    positions: tuple[tuple[float, float], ...] | None = described(
+        None, "where the nodes stand, pairs (x, y) [m]; None: they are drawn"
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()

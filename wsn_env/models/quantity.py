@@ -45,6 +45,11 @@ def quantity(default: Any, meaning: str, **allowed: Any) -> Any:
     return field(default=default, metadata={"meaning": meaning, "allowed": allowed})
 
 
+def described(default: Any, meaning: str) -> Any:
+    """A field that its section checks itself."""
+    return field(default=default, metadata={"meaning": meaning})
+
+
 def check_quantity(  # noqa: PLR0913
     owner: str,
     name: str,

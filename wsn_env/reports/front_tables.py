@@ -60,7 +60,7 @@ def print_hypervolumes(volumes: list[Volume], reference: tuple[float, float]) ->
         title="Hypervolume",
         caption=f"up to the reference point of {error:g} m and {energy:g} mJ; 95 % bootstrap intervals, paired",
     )
-    for column in ("front", "hypervolume m mJ", "of the box", f"{first} - front"):
+    for column in ("front", "hypervolume m mJ", "of the box", f"difference to {first}"):
         table.add_column(column, justify="left" if column == "front" else "right")
     digits = _digits(error * energy)
     for volume in volumes:

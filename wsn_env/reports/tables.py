@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 OVER_REFERENCE = "RMS / reference"
-HEADER = ("policy", "return", "{} - policy", "RMS m", OVER_REFERENCE, "energy mJ/period", "awake", "lost")
+HEADER = ("policy", "return", "difference to {}", "RMS m", OVER_REFERENCE, "energy mJ/step", "awake", "lost")
 CAPPED = "capped error m"
 LIFETIME = ("first death", "half dead", "functional", "tracked %", "left mJ")
 
@@ -45,13 +45,13 @@ def describe_reference(evaluation: Evaluation) -> str:
 
 
 def table_rows(evaluation: Evaluation, lam: float, reference: str) -> list[tuple[str, ...]]:
-    """Best return first; means with 95 % intervals, and the paired difference of the reference's return minus each."""
+    """Best return first; means with 95 % intervals, and the paired difference of each return to the reference's."""
     rows, cap, dying = [], evaluation.scenario.error_cap_m, nodes_die(evaluation)
     for policy in evaluation.policies:
         s = evaluation.summary(policy, lam)
         ratio = evaluation.rms_over_reference(policy, lam)
         difference = (
-            "" if policy == reference else format_interval(evaluation.difference(reference, policy, lam), 2, "+")
+            "" if policy == reference else format_interval(evaluation.difference(policy, reference, lam), 2, "+")
         )
         rows.append(
             (
@@ -116,7 +116,7 @@ def print_tables(evaluation: Evaluation, reference: str | None = None, most: int
         ranked = evaluation.ranked(lam)
         shown = [policy for policy in ranked if most is None or policy in (*ranked[:most], reference)]
         console.print(_terminal_table(evaluation, lam, reference, shown))
-        notes = [f"{reference} - policy: paired difference of returns, 95 % interval; mJ a period"]
+        notes = [f"to {reference}: paired difference of returns, positive is better; mJ a time step"]
         notes += [f"{len(ranked) - len(shown)} more: evaluation.md"] if len(shown) < len(ranked) else []
         notes += describe_best_in_hindsight(evaluation, lam)
         console.print("\n".join(notes), style="dim")
@@ -137,11 +137,11 @@ def _terminal_table(evaluation: Evaluation, lam: float, reference: str, shown: l
     error = ["RMS m"] if cap is None else ["capped m"]
     error += ["/ref"] if has_reference(evaluation.scenario) else []
     last = "functional" if dying else "lost"
-    for name in ("policy", "return", f"{reference} - policy", *error, "mJ", "awake", last):
+    for name in ("policy", "return", f"to {reference}", *error, "mJ", "awake", last):
         table.add_column(name, justify="left" if name == "policy" else "right", overflow="fold")
     for policy in shown:
         s = evaluation.summary(policy, lam)
-        difference = evaluation.difference(reference, policy, lam)
+        difference = evaluation.difference(policy, reference, lam)
         ratio = evaluation.rms_over_reference(policy, lam)
         table.add_row(
             policy,

@@ -26,6 +26,7 @@ from wsn_env.models.quantity import (
     ScenarioError,
     Section,
     UnknownQuantity,
+    described,
     is_line,
     quantity,
     short,
@@ -63,7 +64,7 @@ MOST_LAM = 1e9  # m/mJ: observations and rewards are float32
 class Scenario(Section):
     """Everything about a simulated network. `Scenario.named(id)` gives a published system's."""
 
-    name: str = "PreDC-v0"
+    name: str = described("PreDC-v0", "one line of text for tables and pages")
     periods: int = quantity(100, "horizon of an episode", at_least=1, at_most=10**7, whole=True)
     period_s: float = quantity(1.0, "sampling period T", at_least=1e-6, at_most=3600)
     lam: float | tuple[float, float] = quantity(
@@ -102,7 +103,7 @@ class Scenario(Section):
     measurement: Measurement = Position()
     radio: Link = Radio()
     tracking: Tracking = Tracking()
-    faults: tuple[Fault, ...] = ()
+    faults: tuple[Fault, ...] = described((), 'what goes wrong: faults, or text such as "stuck,share=0.1+late"')
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -12,7 +12,7 @@ from wsn_env.compiled.elementary import log
 from wsn_env.models.measurement.base import AtHead, Line, Measurement, Memory, Occasion, PositionBelief
 from wsn_env.models.measurement.beacon_levels import predict_levels, weigh_levels
 from wsn_env.models.measurement.beacon_packets import Packets
-from wsn_env.models.quantity import ScenarioError, check_quantity, quantity
+from wsn_env.models.quantity import ScenarioError, check_quantity, described, quantity
 from wsn_env.models.recordings.replay import load_map
 
 if TYPE_CHECKING:
@@ -44,9 +44,9 @@ class Beacon(Measurement):
     the recordings of Danis, Naskali, Cemgil & Ersoy (2022), see `Ble-v0`.
     """
 
-    at_1m_db: float | tuple[float, ...] = -59.1  # P0; a number, or one a receiver
-    exponents: float | tuple[float, ...] = 1.7  # n
-    heights_m: float | tuple[float, ...] = 0.0  # of the receivers
+    at_1m_db: float | tuple[float, ...] = described(-59.1, "P0, level at 1 m [dBm]; one for all receivers or one each")
+    exponents: float | tuple[float, ...] = described(1.7, "path-loss exponent n; one for all receivers or one each")
+    heights_m: float | tuple[float, ...] = described(0.0, "height of the receivers; one for all or one each")
     beacon_m: float = quantity(0.0, "height of the beacon", at_least=0, at_most=1000)
     floor_m: float = quantity(0.1, "nearer than this the level grows no more", at_least=1e-6, at_most=1e6)
     field_db: float = quantity(2.24, "sd of the static field", at_least=0, at_most=1000)
@@ -72,7 +72,9 @@ class Beacon(Measurement):
         at_most=1,
     )
 
-    residual_map: str | None = None  # a file of `wsn calibrate --maps`: the static field as the tracker knows it
+    residual_map: str | None = described(
+        None, "file of `wsn calibrate --maps`, the static field as the tracker knows it; None: it knows none"
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from wsn_env.models.motion.recorded import RecordedMotion
-from wsn_env.models.quantity import ScenarioError
+from wsn_env.models.quantity import ScenarioError, described
 
 if TYPE_CHECKING:
     from wsn_env.scenario import Scenario
@@ -24,8 +24,10 @@ class Legs(RecordedMotion):
     """
 
     fitting_q: ClassVar[float] = 0.2
-    start_m: tuple[float, float] = (5.0, 5.0)  # x, y
-    legs: tuple[tuple[float, float, float], ...] = ((100.0, 0.9, 0.9),)  # s, m/s along x, m/s along y
+    start_m: tuple[float, float] = described((5.0, 5.0), "where it begins, (x, y) [m]")
+    legs: tuple[tuple[float, float, float], ...] = described(
+        ((100.0, 0.9, 0.9),), "each leg's duration [s] and velocity along x and y [m/s]"
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()

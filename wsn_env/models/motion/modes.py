@@ -27,7 +27,7 @@ class Mode(NamedTuple):
     draws: int  # of DRAWS, in which it is drawn
 
 
-MODES = (  # found by trial on straight, turning, stopping and recorded motion (docs/environment.md)
+MODES = (  # found by trial on straight, turning, stopping and recorded motion (docs/filters.md)
     Mode("quiet", 0.031, 0.0, 0.021, 13),
     Mode("varying", 0.34, 0.0, 0.045, 11),
     Mode("turning_left", 0.17, 0.08, 0.08, 1),

@@ -12,7 +12,7 @@ import numpy as np
 from wsn_env.compiled import draws
 from wsn_env.models.arguments import check_argument
 from wsn_env.models.motion.base import Motion
-from wsn_env.models.quantity import ScenarioError, quantity
+from wsn_env.models.quantity import ScenarioError, described, quantity
 from wsn_env.models.recordings.tracks import read_track
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ class Recorded(RecordedMotion):
     """
 
     fitting_q: ClassVar[float] = 0.2
-    tracks: tuple[str, ...] = ()
+    tracks: tuple[str, ...] = described((), "CSV files with columns t, x, y [s, m, m]")
     span_m: float | None = quantity(80.0, "scale to this extent and centre; None: as recorded", above=0, optional=True)
 
     def __post_init__(self) -> None:

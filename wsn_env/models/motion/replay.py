@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from wsn_env.models.motion.recorded import RecordedMotion
-from wsn_env.models.quantity import ScenarioError
+from wsn_env.models.quantity import ScenarioError, described
 from wsn_env.models.recordings.receivers import OUTSIDE_M, in_room
 from wsn_env.models.recordings.replay import periods_of, receivers_of, recorded
 
@@ -28,7 +28,7 @@ class Replay(RecordedMotion):
     """
 
     fitting_q: ClassVar[float] = 0.2
-    recording: str = ""
+    recording: str = described("", "a recorded track with its packets, as straight_01_all_sensors.mbd")
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "recording", str(self.recording))

@@ -70,8 +70,9 @@ def _comparison_sections(evaluation: Evaluation) -> list[str]:
     reference = evaluation.policies[0]
     parts = [
         f"<p>{evaluation.episodes:,} paired episodes of each policy and lam: all meet the same fields, tracks,"
-        f" detections and noises. Means with 95 % bootstrap intervals; <i>{html.escape(reference)} - policy</i> is the"
-        f" paired difference of returns. About the reference: {html.escape(describe_reference(evaluation))}.</p>"
+        f" detections and noises. Means with 95 % bootstrap intervals; <i>difference to {html.escape(reference)}</i>"
+        " is the paired difference of returns, positive is better. About the reference:"
+        f" {html.escape(describe_reference(evaluation))}.</p>"
     ]
     for lam in evaluation.lams:
         rows = [table_header(evaluation, reference), *table_rows(evaluation, lam, reference)]
