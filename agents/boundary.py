@@ -25,6 +25,11 @@ class Boundary(ViewPolicy):
     sds: float = 1.0
     sees_lam = False
 
+    @property
+    def fits(self) -> bool:
+        """Binary sensors."""
+        return self.scenario.measurement.reports_state
+
     def __post_init__(self) -> None:
         check_quantity("Boundary", "width_m", self.width_m, at_least=0)
         check_quantity("Boundary", "sds", self.sds, at_least=0)

@@ -41,6 +41,11 @@ class Budget(ViewPolicy):
     steering: float = 1.4
     sees_lam = False
 
+    @property
+    def fits(self) -> bool:
+        """Where batteries have to last."""
+        return self.scenario.scarce_energy
+
     def __post_init__(self) -> None:
         check_quantity("Budget", "price", self.price, above=0, at_most=MOST)
         check_quantity("Budget", "steering", self.steering, at_least=0, at_most=100)

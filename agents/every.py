@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wsn_env.agents.base import ViewPolicy
+from wsn_env.agents.base import FEW_NODES, ViewPolicy
 from wsn_env.models.quantity import check_quantity
 from wsn_env.models.state import NOBODY, Cluster
 from wsn_env.simulation.view import View
@@ -18,6 +18,11 @@ class Every(ViewPolicy):
 
     n: int = 4
     sees_lam = False
+
+    @property
+    def fits(self) -> bool:
+        """Where nodes are few."""
+        return self.scenario.field.nodes <= FEW_NODES
 
     def __post_init__(self) -> None:
         check_quantity("Every", "n", self.n, at_least=1, whole=True)

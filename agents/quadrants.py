@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wsn_env.agents.base import ViewPolicy
+from wsn_env.agents.base import FEW_NODES, ViewPolicy
 from wsn_env.agents.strongest import highest_scoring
 from wsn_env.models.quantity import check_quantity
 from wsn_env.models.state import Cluster
@@ -22,6 +22,11 @@ class Quadrants(ViewPolicy):
 
     n: int = 2
     sees_lam = False
+
+    @property
+    def fits(self) -> bool:
+        """Where nodes are few."""
+        return self.scenario.field.nodes <= FEW_NODES
 
     def __post_init__(self) -> None:
         check_quantity("Quadrants", "n", self.n, at_least=0, whole=True)

@@ -20,6 +20,11 @@ class Strongest(ViewPolicy):
     n: int = 2
     sees_lam = False
 
+    @property
+    def fits(self) -> bool:
+        """Receivers of a beacon."""
+        return self.scenario.measurement.lasting_errors
+
     def __post_init__(self) -> None:
         check_quantity("Strongest", "n", self.n, at_least=0, whole=True)
 

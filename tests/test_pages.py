@@ -205,7 +205,7 @@ def opened(browser, two):
 
 
 def period(browser) -> int:
-    return int(re.match(r"period (\d+) of 100", browser.find_element("id", "period").text)[1])
+    return int(re.match(r"step (\d+) of 100", browser.find_element("id", "period").text)[1])
 
 
 def keys(browser, *pressed):
@@ -267,7 +267,7 @@ def test_hovering_shows_a_node(opened):
     tip = browser.find_element("id", "tip")
     assert tip.is_displayed() and "battery" in tip.text and "last in 30" in tip.text
     browser.execute_script("seek(0)")  # what it says goes with the time
-    assert tip.is_displayed() and "awake in 0 of 0 periods" in tip.text
+    assert tip.is_displayed() and "awake in 0 of 0 time steps" in tip.text
     ActionChains(browser).move_to_element(browser.find_element("id", "play")).perform()
     assert not tip.is_displayed()
 
@@ -290,8 +290,24 @@ def test_a_search_wakes_every_node_that_one_hovers_over(browser, tmp_path):
         asleep,
     )
     tip = browser.find_element("id", "tip").text
-    assert tip.startswith(f"node {asleep} ") and f"awake in 1 of {k} periods, last in {k}" in tip
+    assert tip.startswith(f"node {asleep} ") and f"awake in 1 of {k} time steps, last in {k}" in tip
     assert complaints(browser) == []
+
+
+def test_all_is_in_sight_without_scrolling(opened):
+    """Fields, curves, buttons and legend in the window of 1,200 x 1,000."""
+    browser, _ = opened
+    height, end = browser.execute_script(
+        "return [innerHeight, document.getElementById('legend').getBoundingClientRect().bottom]"
+    )
+    assert end <= height
+
+
+def test_a_hue_means_one_thing(opened):
+    """Policies have none of the hues of what is in the field."""
+    browser, data = opened
+    lines = browser.execute_script("return [stroke(0)[0], stroke(1)[0]]")
+    assert lines[0] != lines[1] and not {*lines} & {*data["hue"].values()}
 
 
 def test_what_is_drawn_moves_with_time(opened):

@@ -20,6 +20,7 @@ from wsn_env.evaluation.kept_blocks import BLOCKS_FILE
 from wsn_env.evaluation.policies import named_policies, policy_names
 from wsn_env.models.state import Cluster
 from wsn_env.scenario.sensing import detection_probability
+from wsn_env.training.comparison import make_baselines
 
 SCENARIO = Scenario.named("PreDC-v0", particles=200)
 
@@ -396,3 +397,19 @@ def test_what_was_not_compared_is_told():
 def test_a_label_is_not_empty():
     with pytest.raises(ValueError, match="'=pre_dc' has no label"):
         named_policies(["=pre_dc"], Scenario.named("PreDC-v0"))
+
+
+def test_a_training_is_compared_with_the_policies_that_fit_its_scenario(capsys):
+    made = {name: make_baselines(Scenario.named(name)) for name in ("PreDC-v0", "Binary-v0", "Ble-v0", "Lifetime-v0")}
+    assert "meant for other scenarios: all, boundary, budget, every, quadrants, strongest\n" in capsys.readouterr().out
+    for name in ("pre_dc", "centroid", "static_cluster", "nearest0", "informed8", "greedy", "adaptive", "random"):
+        assert all(name in baselines for baselines in made.values())
+    at_home = {
+        "boundary": "Binary-v0",
+        "strongest": "Ble-v0",
+        "quadrants": "Ble-v0",
+        "all": "Ble-v0",
+        "budget": "Lifetime-v0",
+    }
+    for name, home in at_home.items():
+        assert [scenario for scenario, baselines in made.items() if name in baselines] == [home]

@@ -21,14 +21,21 @@ SLOW = ("ppo", "planner")  # left out: the one trained is in it, the other takes
 
 
 def make_baselines(scenario: Scenario) -> dict[str, Policy]:
-    """Every installed policy by name; one that cannot be made is left out, and said."""
-    made = {}
+    """Every installed policy that fits the scenario, by name; says which are left out."""
+    made, elsewhere = {}, []
     names = [name for name in policy_names() if name not in (*SLOW, *SIZED)]
     for name in sorted(names + [f"{name}{size}" for name in SIZED for size in SIZES]):
         try:
-            made[name] = make_policy(name, scenario)
+            policy = make_policy(name, scenario)
         except ValueError as problem:
             print(f"train: left out of the comparison: {problem}", file=sys.stderr)
+            continue
+        if getattr(policy, "fits", True):
+            made[name] = policy
+        else:
+            elsewhere.append(name)
+    if elsewhere:
+        print(f"train: not compared, since they are meant for other scenarios: {', '.join(elsewhere)}")
     return made
 
 

@@ -13,6 +13,7 @@ let period = 0;
 let timer = null;
 
 const figure = (value) => (value >= 1000 ? Math.round(value).toLocaleString("en") : String(Number(value.toPrecision(3))));
+const percent = (share) => `${Number((100 * Math.max(share, 0)).toPrecision(4))} %`;
 const joules = (mj) => (mj >= 1000 ? `${figure(mj / 1000)} J` : `${figure(mj)} mJ`);
 
 function pairs(flat, unit) {
@@ -41,15 +42,15 @@ const views = episodes.map((episode, number) => {
   const caption = document.createElement("figcaption");
   const name = document.createElement("b");
   name.textContent = episode.policy;
-  const numbers = document.createElement("span");
-  caption.append(name, numbers);
+  const numbers = document.createElement("span"), event = document.createElement("em");
+  caption.append(name, event, numbers);
   const canvas = document.createElement("canvas");
   canvas.id = `field${number}`;
   canvas.setAttribute("role", "img");
   canvas.setAttribute("aria-label", `field under ${episode.policy}`);
   figure.append(caption, canvas);
   element("fields").append(figure);
-  const view = { episode, canvas, numbers, hovered: -1 };
+  const view = { episode, canvas, numbers, event, hovered: -1 };
   canvas.addEventListener("pointermove", (event) => hover(view, event));
   canvas.addEventListener("pointerleave", () => { view.hovered = -1; element("tip").hidden = true; draw(); });
   return view;
@@ -84,6 +85,7 @@ function line(pen, points, stroke, width, dash = []) {
   points.forEach(([x, y], i) => (i ? pen.lineTo(x, y) : pen.moveTo(x, y)));
   pen.strokeStyle = stroke;
   pen.lineWidth = width;
+  pen.lineJoin = "round";
   pen.setLineDash(dash);
   pen.stroke();
   pen.setLineDash([]);
@@ -133,15 +135,18 @@ function drawField(view) {
     pen.fillRect(x - 1, y - 1, 2, 2);
   }
   const small = nodes.length > 400 ? 2 : 3;
+  pen.lineWidth = 1;
   nodes.forEach((at, node) => {
-    const share = least < 1 ? (left[node] / data.battery_j - least) / (1 - least) : 1;
-    pen.globalAlpha = left[node] > 0 ? 0.35 + 0.65 * share : 1;
-    if (left[node] > 0) return disc(pen, place(at), small, colour("--soft"));
+    if (left[node] > 0) {
+      pen.globalAlpha = least < 1 ? (left[node] / data.battery_j - least) / (1 - least) : 1;
+      disc(pen, place(at), small, colour("--soft"));
+      pen.globalAlpha = 1;
+      return disc(pen, place(at), small, null, colour("--soft"));
+    }
     const [x, y] = place(at);
     line(pen, [[x - small, y - small], [x + small, y + small]], colour("--soft"), 1);
     line(pen, [[x - small, y + small], [x + small, y - small]], colour("--soft"), 1);
   });
-  pen.globalAlpha = 1;
   const mean = [frame.mean[0] * data.unit_m, frame.mean[1] * data.unit_m];
   const to = { head: nodes[frame.head], sink: [data.room_m[0] / 2, data.room_m[1] / 2], target: track[period] }[data.receiver];
   if (to) for (const node of frame.heard) line(pen, [place(nodes[node]), place(to)], HUE.report, 1.5);
@@ -165,8 +170,8 @@ function drawField(view) {
   line(pen, [[x, y - 6], [x, y + 6]], colour("--ink"), 2);
   if (view.hovered >= 0) { pen.lineWidth = 2; disc(pen, place(nodes[view.hovered]), 9, null, colour("--ink")); }
   const spent = episode.frames.slice(0, period + 1).reduce((sum, f) => sum + f.energy, 0);
-  view.numbers.textContent = `error ${frame.error.toFixed(2)} m · ${frame.awake} awake · ${joules(spent)} so far`
-    + (frame.search ? " · search" : "") + (frame.handover ? " · handover" : "");
+  view.numbers.textContent = `error ${frame.error.toFixed(2)} m · ${frame.awake} awake · ${joules(spent)} so far`;
+  view.event.textContent = [frame.search && "search", frame.handover && "handover"].filter(Boolean).join(" · ");
 }
 
 function hover(view, event) {
@@ -195,14 +200,15 @@ function tell(view) {
     const [x, y] = nodes[best];
     element("tip").textContent = `node ${best} at (${x.toFixed(1)}, ${y.toFixed(1)}) m\n`
       + `battery ${(100 * left[period][best] / data.battery_j).toFixed(3)} %\n`
-      + `awake in ${periods.length} of ${period} periods${periods.length ? `, last in ${periods.at(-1)}` : ""}\n`
+      + `awake in ${periods.length} of ${period} time steps${periods.length ? `, last in ${periods.at(-1)}` : ""}\n`
       + `reported in ${heard}`;
   }
 }
 
 // --- curves ---
 
-const LINES = [HUE.head, HUE.member];
+// Hues stand for what is in the field; policies are told apart by darkness and width.
+const stroke = (number) => [colour(number ? "--soft" : "--ink"), number ? 3 : 1.5];
 
 function drawCurve(id, title, unit, large) {
   const canvas = element(id), [pen, width, height] = sized(canvas);
@@ -224,15 +230,19 @@ function drawCurve(id, title, unit, large) {
     line(pen, [[box.left, y], [box.right, y]], colour("--line"), 1);
     pen.fillText(figure(share * most), box.left - 5, y + 4);
   }
-  if (last === 1) values.forEach(([value], number) => disc(pen, at(1, value), 3, LINES[number]));
-  values.forEach((series, number) => line(pen, series.map((value, k) => at(k + 1, value)), LINES[number], 1.5));
+  for (const [number, series] of [...values.entries()].reverse()) {
+    if (last === 1) disc(pen, at(1, series[0]), 3, stroke(number)[0]);
+    line(pen, series.map((value, k) => at(k + 1, value)), ...stroke(number));
+  }
   line(pen, [[at(period, 0)[0], box.top], [at(period, 0)[0], box.bottom]], colour("--ink"), 1);
   let right = box.right;
   for (const number of [...episodes.keys()].reverse()) {
     const name = short(episodes[number].policy);
-    pen.fillStyle = LINES[number];
+    pen.fillStyle = stroke(number)[0];
     pen.fillText(name, right, 13);
-    right -= pen.measureText(name).width + 12;
+    right -= pen.measureText(name).width + 4;
+    line(pen, [[right - 16, 9], [right, 9]], ...stroke(number));
+    right -= 28;
   }
   pen.textAlign = "left";
   canvas.onclick = (event) => {
@@ -253,7 +263,7 @@ function draw() {
 function seek(to) {
   period = Math.min(Math.max(to, 0), last);
   element("slider").value = period;
-  element("period").textContent = `period ${period} of ${last}, ${Number((period * data.period_s).toPrecision(6))} s`;
+  element("period").textContent = `step ${period} of ${last}, ${Number((period * data.period_s).toPrecision(6))} s`;
   if (period === last) pause();
   draw();
 }
@@ -294,16 +304,21 @@ element("speed").onchange = () => faster(0);
 element("slider").max = last;
 element("slider").oninput = (event) => seek(Number(event.target.value));
 element("about").textContent = `lam = ${data.lam} m/mJ`
-  + (data.unscored ? ` · RMS without the first ${data.unscored} periods` : "") + episodes.map((episode) =>
-  ` · ${short(episode.policy)}: RMS ${episode.rms_m.toFixed(3)} m, ${joules(episode.energy_mj)} a period, return ${episode.total.toFixed(1)}`).join("");
+  + (data.unscored ? ` · RMS without the first ${data.unscored} time steps` : "") + episodes.map((episode) =>
+  ` · ${short(episode.policy)}: RMS ${episode.rms_m.toFixed(3)} m, ${joules(episode.energy_mj)} a time step, return ${episode.total.toFixed(1)}`).join("");
 for (const [symbol, word] of data.legend) {
   const entry = document.createElement("span"), mark = document.createElement("i");
   mark.style[["heard", "target"].includes(symbol) ? "borderColor" : "background"] = HUE[symbol];
   entry.append(mark, word);
   element("legend").append(entry);
 }
-element("legend").append("cross: estimate; ellipse: 95 %; " + (data.radius_m ? "shade: sensing range; " : "") + "grey: asleep, the palest has the emptiest battery"
-  + (least <= 0 ? "; crossed out: dead" : ""));
+element("legend").append("cross: estimate; ellipse: 95 %; " + (data.radius_m ? "shade: sensing range; " : "") + "grey: asleep" + (least <= 0 ? "; crossed out: dead" : ""));
+if (least < 1) {
+  const scale = document.createElement("span"), bar = document.createElement("i");
+  bar.className = "scale";
+  scale.append(`battery ${percent(least)}`, bar, "100 %");
+  element("legend").append(scale);
+}
 new ResizeObserver(draw).observe(document.body);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 seek(0);
