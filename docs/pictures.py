@@ -1,13 +1,16 @@
 """Pictures of every scenario and of every policy's choice, for the site: frames of the environment itself.
 
-python docs/pictures.py FOLDER    also makes episode.gif, the README's, and comparison.png, the landing page's
+python docs/pictures.py FOLDER    also makes episode.gif, comparison.png and, with chromium, replay.png and report.png
 """
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from shutil import which
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from PIL import Image
@@ -18,6 +21,8 @@ from wsn_env.envs.registration import IDS
 from wsn_env.envs.rendering.camera import Camera
 from wsn_env.envs.rendering.palette import BLUE, FLASH, FULL, GREEN, INK, ORANGE, PURPLE, SENSED, SKY, VERMILION, YELLOW
 from wsn_env.envs.rendering.plan import SIZE
+from wsn_env.reports.pages.evaluation_page import write_report
+from wsn_env.reports.pages.replay_page import replay
 from wsn_env.reports.pictures import write_picture
 from wsn_env.reports.plots import draw_comparison
 
@@ -87,7 +92,28 @@ def compare(path: Path, episodes: int = 1000) -> None:
     write_picture(path, draw_comparison(evaluation, 4.0, emphasis="ppo"))
 
 
+def photograph(page: str, path: Path, width: int, height: int) -> None:
+    """A picture of a page as chromium shows it."""
+    flags = f"--headless=new --no-sandbox --disable-gpu --hide-scrollbars --window-size={width},{height}".split()
+    subprocess.run(["chromium", *flags, f"--screenshot={path}", page], check=True, capture_output=True)
+
+
+def photograph_pages(folder: Path) -> None:
+    """replay.png and report.png."""
+    with TemporaryDirectory() as name:
+        made = Path(name)
+        scenario = Scenario.named("PreDC-v0")
+        names = "ppo pre_dc nearest1 nearest2 nearest4 greedy adaptive".split()
+        policies = {name: make_policy(name, scenario) for name in names}
+        replay({name: policies[name] for name in ("pre_dc", "ppo")}, scenario, 3, made / "replay.html")
+        photograph(f"{(made / 'replay.html').as_uri()}#60", folder / "replay.png", 1200, 820)
+        write_report(made, evaluate(policies, scenario, [1.0, 4.0, 16.0]), policies)
+        photograph((made / "report.html").as_uri(), folder / "report.png", 1000, 1900)
+
+
 if __name__ == "__main__":
     draw_all(Path(sys.argv[1]))
     film(Path(sys.argv[1]) / "episode.gif")
     compare(Path(sys.argv[1]) / "comparison.png")
+    if which("chromium"):
+        photograph_pages(Path(sys.argv[1]).absolute())

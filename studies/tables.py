@@ -68,9 +68,9 @@ MOTIONS = {  # what a filter may have to follow, in PreDC-v0
     "walk": "motion=walk",
     "crossing, with a stop": "faults=stops",
 }
-GREEDY = {"information for energy, tuned for each lam": "greedy"}  # rivals of the policy that comes with the package
-NEAREST = {"size by the belief's spread, tuned for each lam": "adaptive"} | GREEDY | {"Pre-DC": "pre_dc"}
-INFORMED = {"the same, size by the belief's spread, tuned for each lam": "adaptive_informed"} | GREEDY
+GREEDY = {"`greedy`, tuned for each lam": "greedy"}  # rivals of the policy that comes with the package
+NEAREST = {"`adaptive`, tuned for each lam": "adaptive"} | GREEDY | {"`pre_dc`": "pre_dc"}
+INFORMED = {"`adaptive_informed`, tuned for each lam": "adaptive_informed"} | GREEDY
 FIXED_Q = (0.0125, 0.025, 0.05, 0.1, 0.2, 0.4)  # m/s^2
 MANOEUVRE_Q = 0.6
 LOST_M = 20.0  # an episode's RMS counts as this at most
@@ -164,7 +164,7 @@ def anchors(episodes: int | None) -> tuple[list[str], Rows]:
     for policy in ("nearest1", "informed1", "informed3", "all"):
         found = play(scenario_of("Anchors-v0"), policy, episodes)
         rows.append([policy, str(Measured.root_mean(found["rms_m"] ** 2)), str(Measured.mean(found["energy_mj"]))])
-    return ["Anchors-v0", "RMS m", "energy mJ a period"], rows
+    return ["Anchors-v0", "RMS m", "energy mJ a time step"], rows
 
 
 def shipped(name: str, episodes: int | None, rules: tuple[str, ...] = (), family: str = "") -> tuple[list[str], Rows]:
@@ -172,9 +172,9 @@ def shipped(name: str, episodes: int | None, rules: tuple[str, ...] = (), family
     scenario, sizes = Scenario.named(name), [f"{family}{n}" for n in range(9)] if family else []
     lams = scenario.lam_octaves
     found = evaluate(["ppo", *rules, *sizes], scenario, lams, episodes or 1000)
-    shown = {name: dict.fromkeys(lams, "ppo")}
+    shown = {"ppo": dict.fromkeys(lams, "ppo")}
     if family:
-        shown[f"best of {family}0..8, in hindsight"] = {lam: best_of(found, sizes, lam) for lam in lams}
+        shown[f"{family}0..8, the best at each lam"] = {lam: best_of(found, sizes, lam) for lam in lams}
     shown |= {rule: dict.fromkeys(lams, rule) for rule in rules}
     rows = [
         [label, *(str(Measured.mean(found.values(policy, lam, "return"))) for lam, policy in of_lam.items())]
@@ -188,9 +188,9 @@ def comparison(name: str, episodes: int | None, family: str, others: dict[str, s
     scenario, sizes = Scenario.named(name), [f"{family}{n}" for n in range(9)]
     lams = scenario.lam_octaves[1::2]
     found = evaluate(["ppo", *sizes, *others.values()], scenario, lams, episodes or 1000)
-    rows = [["**PPO**", *(f"**{found.values('ppo', lam, 'return').mean():.1f}**" for lam in lams)]]
+    rows = [["**`ppo`**", *(f"**{found.values('ppo', lam, 'return').mean():.1f}**" for lam in lams)]]
     best = {lam: best_of(found, sizes, lam) for lam in lams}
-    for label, rule in {f"best of {family}0..8 in hindsight": "", **others}.items():
+    for label, rule in {f"`{family}0..8`, the best at each lam": "", **others}.items():
         cells = []
         for lam in lams:
             rival = rule or best[lam]
@@ -223,19 +223,19 @@ TABLES: dict[str, Callable[[int | None], tuple[list[str], Rows]]] = {
         comparison,
         "Binary-v0",
         family="informed",
-        others=INFORMED | {"who stands at the edge of the disc": "boundary", "Pre-DC": "pre_dc"},
+        others=INFORMED | {"`boundary`": "boundary", "`pre_dc`": "pre_dc"},
     ),
     "comparison_Anchors-v0": partial(
         comparison,
         "Anchors-v0",
         family="informed",
-        others=INFORMED | {"the two nearest and the head": "nearest2"},
+        others=INFORMED | {"`nearest2`": "nearest2"},
     ),
     "comparison_Underwater-v0": partial(
         comparison,
         "Underwater-v0",
         family="informed",
-        others=INFORMED | {"strongest signal": "strongest_signal", "Pre-DC": "pre_dc"},
+        others=INFORMED | {"`strongest_signal`": "strongest_signal", "`pre_dc`": "pre_dc"},
     ),
     "shipped_PreDC-v0": partial(shipped, "PreDC-v0"),
     "shipped_Rssi-v0": partial(shipped, "Rssi-v0"),

@@ -92,9 +92,8 @@ def main() -> int:
             evaluation = evaluate(policies, scenario, lams, asked.episodes, asked.seed, keep=folder, progress=report)
         evaluation.save(folder)
         table[what] = [lead_of(asked.policy, evaluation, lam) for lam in lams]
-    text = markdown_table(
-        ["world", *(f"{lam:g}" for lam in lams)], [[what, *map(str, row)] for what, row in table.items()]
-    )
+    columns = "scenario variant", *(f"lam = {lam:g}" for lam in lams)
+    text = markdown_table(columns, [[what, *map(str, row)] for what, row in table.items()])
     text += f"\n{count([cell for row in table.values() for cell in row])}\n"
     with replacing(asked.out / f"{usual.name}.md") as path:
         path.write_text(text, encoding="utf-8")
@@ -106,7 +105,7 @@ def main() -> int:
 
 def worlds_of(scenario: Scenario) -> dict[str, str]:
     """{what it is: quantities}."""
-    worlds = {"as it is": ""}
+    worlds = {"unchanged": ""}
     if scenario.field.positions is None:
         for what, share in (("sparse", 0.36), ("dense", 40 / 9)):
             nodes = nodes_of(scenario, share)
@@ -138,10 +137,10 @@ def count(cells: list[Cell]) -> str:
     for leads in ([cell.lead for cell in cells], [cell.hindsight for cell in cells]):
         ahead, behind = sum(lead.low > 0 for lead in leads), sum(lead.high < 0 for lead in leads)
         near = sum(lead.mean > NEAR for lead in leads)
-        told.append(f"ahead in {ahead}, behind in {behind}, better or less than {-NEAR:g} % worse in {near}")
+        told.append(f"better in {ahead}, worse in {behind}, better or less than {-NEAR:g} % worse in {near}")
     return (
-        f"Of {len(cells)} cells: {told[0]} (ahead and behind: the interval is on one side of 0). Beside the rule that"
-        f" these very episodes make the best: {told[1]}."
+        f"Of {len(cells)} cells: {told[0]} (better and worse: the interval is on one side of 0). Against the baseline"
+        f" that is best in the test episodes themselves: {told[1]}."
     )
 
 

@@ -62,7 +62,7 @@ def test_one_policy_in_many_worlds_beside_the_best_rule_of_each(tmp_path, monkey
     assert len(cells) == 4 and {cell[-1] for cell in cells} <= set(RIVALS)
     precise, frugal = [float(cell[1]) for cell in cells[::2]], [float(cell[1]) for cell in cells[1::2]]
     assert min(precise) > 5 and max(frugal) < -100
-    assert text.count("ahead in 2, behind in 2, better or less than 1 % worse in 2") == 2  # in hindsight, too
+    assert text.count("better in 2, worse in 2, better or less than 1 % worse in 2") == 2  # in hindsight, too
 
 
 class Drawn:

@@ -336,7 +336,7 @@ def run_replay(command: Replay) -> None:
         scenario = replay_scenario(scenario, command.recording, calibrated)
     recording = replay(command.policy, scenario, command.seed, command.out)
     for episode in recording.episodes:
-        print(f"{episode.policy}: RMS {episode.rms_m:.3f} m, {episode.energy_mj:.4g} mJ a period")
+        print(f"{episode.policy}: RMS {episode.rms_m:.3f} m, {episode.energy_mj:.4g} mJ a time step")
     print(f"written: {command.out} ({command.out.stat().st_size / 1000:.0f} kB)")
 
 

@@ -114,7 +114,7 @@ class Evaluation:
 
     def _repr_html_(self) -> str:
         """What a notebook shows: at each lam the policies, the best first, with 95 % intervals."""
-        what = {"return": "return", "rms_m": "RMS m", "error_m": "error m", "energy_mj": "energy mJ a period"}
+        what = {"return": "return", "rms_m": "RMS m", "error_m": "error m", "energy_mj": "energy mJ a time step"}
         head = "".join(f"<th>{escape(name)}</th>" for name in ("lam", "policy", *what.values()))
         rows = []
         for lam in self.lams:

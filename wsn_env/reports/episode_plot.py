@@ -48,6 +48,6 @@ def plot_episode(policy: str | Policy, scenario: str | Scenario, seed: int = FIR
     axes.plot(*believed.T, color=VERMILION, linewidth=1.0, marker=".", markersize=3, label="estimate")
     mean_mj = float(np.mean(energies))
     axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
-    axes.set_title(escape_label(f"{scenario.name}, {name}: RMS {rms_m:.3g} m, {mean_mj:.3g} mJ a period"))
+    axes.set_title(escape_label(f"{scenario.name}, {name}: RMS {rms_m:.3g} m, {mean_mj:.3g} mJ a time step"))
     axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1, 1))
     return axes

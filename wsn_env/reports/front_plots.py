@@ -87,7 +87,7 @@ def plot_fronts(evaluation: Evaluation, found: Fronts | None = None, ax: Any = N
             label_decades(axis)
     outside = [f"{p.policy}{_at(p)}: {p.energy.mean:.3g} mJ, {p.error.mean:.3g} m" for p in beyond]
     lines = fill("beyond: " + "; ".join(outside), 120) if outside else ""
-    axes.set_xlabel(escape_label(f"energy [mJ per period]\n{lines}".rstrip()))
+    axes.set_xlabel(escape_label(f"energy [mJ per time step]\n{lines}".rstrip()))
     axes.grid(alpha=0.3, which="both", linewidth=0.5)
     below = -0.12 - 0.035 * len(lines.splitlines())  # the words under the axis
     axes.legend(frameon=False, loc="upper center", bbox_to_anchor=(0.5, below), ncols=4, fontsize=9)

@@ -38,7 +38,7 @@ def print_front(evaluation: Evaluation, found: Fronts) -> None:
     from rich.table import Table
 
     table = Table(title=front_title(evaluation), caption="means with 95 % bootstrap intervals")
-    for column in ("policy", "lam m/mJ", "mean error m", "energy mJ/period"):
+    for column in ("policy", "lam m/mJ", "mean error m", "energy mJ/step"):
         table.add_column(column, justify="left" if column == "policy" else "right")
     fine, small = map(_digits, reference_point(evaluation.scenario))
     for points in found.values():

@@ -87,7 +87,7 @@ def plot_comparison(
         axes.plot(xs, ys, "--", color=GREY, linewidth=1, label=escape_label(f"return of {emphasis}"), zorder=1)
         axes.axis(limits)
     axes.legend(frameon=False)
-    axes.set_xlabel("energy [mJ per period]")
+    axes.set_xlabel("energy [mJ per time step]")
     axes.set_ylabel("mean error [m]")
     axes.set_title(
         escape_label(f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes")

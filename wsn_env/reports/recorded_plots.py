@@ -49,7 +49,7 @@ def draw_recorded(evaluation: RecordedEvaluation) -> Figure:
             axes.plot(*zip(*points), linewidth=1.2, zorder=4 if learned else 3, **style)
             side = (6, 8) if k % 2 else (6, -13)
             axes.annotate(escape_label(policy), points[-1], xytext=side, textcoords="offset points", fontsize=9)
-    axes.set_xlabel("energy [mJ per period]")
+    axes.set_xlabel("energy [mJ per time step]")
     axes.set_ylabel("RMS error, mean over the tracks [m]")
     axes.set_title(escape_label(f"{evaluation.first.scenario.name}: {evaluation.description}"))
     axes.grid(alpha=0.3)

@@ -20,7 +20,7 @@ def recorded_rows(evaluation: RecordedEvaluation, lam: float) -> tuple[list[str]
     track's RMS."""
     first = evaluation.first
     reference = evaluation.mean(REFERENCE, lam, "rms_m") if REFERENCE in first.policies else None
-    header = ["policy", "RMS m", "sd over seeds", "/ all", "e²/trace", "energy mJ/period", "listening"]
+    header = ["policy", "RMS m", "sd over seeds", "/ all", "e²/trace", "energy mJ/step", "listening"]
     rows = []
     for policy in first.policies:
         rms = evaluation.mean(policy, lam, "rms_m")

@@ -92,7 +92,7 @@ def _draw_lead(steps: np.ndarray, progress: dict[str, np.ndarray]) -> Figure:
         axes.plot(told, lead, color=colour, linewidth=1.5, marker="o", markersize=3, label=f"lam {lam:g}")
         axes.errorbar(told[-1] * 1.03 ** (place + 1), lead[-1], half, color=colour, capsize=3, linewidth=1.2)
         lowest = min(lowest, float(lead.min(initial=0.0)))
-    axes.set(xlabel="periods of training", ylabel="return over the best rule [%]")
+    axes.set(xlabel="time steps of training", ylabel="return over the best baseline [%]")
     axes.set_ylim(bottom=max(1.1 * lowest, LOWEST_LEAD))
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter(_in_millions)
@@ -119,7 +119,7 @@ def _draw_curves(steps: np.ndarray, progress: dict[str, np.ndarray], names: Sequ
             half = NORMAL_95 * progress[error][finite]
             ends = progress[name][finite] - half, progress[name][finite] + half
             axes.fill_between(steps[finite], *ends, color=BLUE, alpha=0.25, linewidth=0)
-        axes.set(xlabel="periods of training", ylabel=what)
+        axes.set(xlabel="time steps of training", ylabel=what)
         axes.xaxis.set_major_formatter(_in_millions)
         axes.xaxis.get_major_locator().set_params(nbins=5)
         axes.grid(alpha=0.3)

@@ -49,7 +49,7 @@ def sample_sections(evaluation: Evaluation, policies: dict[str, Policy], progres
     return [
         section(
             "Errors and cluster sizes",
-            f"<p>Every period of the first {len(looked_at)} episodes, lam = {lam:g} m/mJ.</p>",
+            f"<p>Every time step of the first {len(looked_at)} episodes, lam = {lam:g} m/mJ.</p>",
             image(figure, "histograms of errors and of cluster sizes"),
         ),
         section(

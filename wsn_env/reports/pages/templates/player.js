@@ -321,4 +321,4 @@ if (least < 1) {
 }
 new ResizeObserver(draw).observe(document.body);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
-seek(0);
+seek(Number(location.hash.slice(1)) || 0); // replay.html#60 opens at that time step
