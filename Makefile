@@ -15,7 +15,7 @@ RUN := $(VENV)/bin/python
 READY := $(VENV)/.ready
 LINKS := out/types
 
-.PHONY: train pretrained test slow examples bench bench-short figures figures-trained docs lint clean
+.PHONY: train pretrained test slow examples bench bench-short figures figures-trained docs lint package clean
 
 train: $(READY)
 	$(RUN) train.py --resume --scenario $(SCENARIO) $(if $(LAM),--lam $(LAM))
@@ -89,6 +89,15 @@ lint: $(READY)
 	rm -rf $(LINKS) && mkdir -p $(LINKS)/wsn_env
 	ln -s $(CURDIR)/wsn_env/* $(CURDIR)/agents $(LINKS)/wsn_env && ln -s $(CURDIR)/train.py $(LINKS)
 	cd $(LINKS) && $(CURDIR)/$(VENV)/bin/mypy --config-file $(CURDIR)/pyproject.toml --cache-dir $(CURDIR)/out/mypy wsn_env train.py
+
+# Wheel and source distribution, and what an installation of the wheel brings (a bill of materials, CycloneDX), in out/package.
+package:
+	rm -rf out/package out/tools out/plain
+	$(PYTHON) -m venv out/tools && $(PYTHON) -m venv out/plain
+	out/tools/bin/python -m pip install $(PIP) build cyclonedx-bom
+	out/tools/bin/python -m build --outdir out/package .
+	out/plain/bin/python -m pip install $(PIP) out/package/*.whl
+	out/tools/bin/cyclonedx-py environment out/plain/bin/python --output-file out/package/sbom.json
 
 $(READY): pyproject.toml constraints.txt Makefile
 	$(PYTHON) -m venv $(VENV)

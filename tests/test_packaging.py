@@ -1,6 +1,7 @@
 """What an installation and a source archive hold, and what an installation leaves alone."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -160,3 +161,12 @@ def test_every_page_names_the_same_version():
     assert wanted == wsn_env.__version__
     assert f"\nversion: {wanted}\n" in (ROOT / "CITATION.cff").read_text()
     assert f"version = {{{wanted}}}" in (ROOT / "docs" / "citing.md").read_text()
+
+
+def test_the_forge_runs_the_make_targets_and_hooks_of_the_same_version():
+    targets = re.search(r"^\.PHONY: (.*)$", (ROOT / "Makefile").read_text(), re.M)[1].split()
+    workflow = (ROOT / ".github" / "workflows" / "ci.yml").read_text()
+    asked = {name for line in re.findall(r"run: make (.*)", workflow) for name in line.split()}
+    assert {"lint", "test", "docs", "package"} == asked <= set(targets)
+    ruff = re.search(r"^ruff==(.*)$", (ROOT / "constraints.txt").read_text(), re.M)[1]
+    assert f"rev: v{ruff}\n" in (ROOT / ".pre-commit-config.yaml").read_text()
