@@ -40,8 +40,8 @@ STRENGTHS: dict[str, tuple[str, ...]] = {  # of each fault, weak, middling and s
     "stops": ("stop_s=10", "stop_s=20", "stop_s=40"),
     "excursion": ("outside_m=2", "outside_m=10", "outside_m=25"),
 }
-FILTERS = {  # what the likelihood reckons with
-    "nothing": {},
+FILTERS = {  # settings by label
+    "plain filter": {},
     "gate_sds=3": dict(gate_sds=3.0),
     "gate_sds=4": dict(gate_sds=4.0),
     "outlier_share=0.05": dict(outlier_share=0.05),
@@ -113,7 +113,7 @@ def _folder(asked: Faults, label: str) -> Path:
 
 
 def costs(evaluation: Evaluation) -> dict[str, np.ndarray]:
-    """(episodes,) error + lam energy of a mean period [m], by policy."""
+    """(episodes,) error + lam energy of a mean time step [m], by policy."""
     periods = evaluation.scenario.periods
     return {name: -evaluation.values(name, LAM, "return") / periods for name in evaluation.policies}
 
@@ -133,11 +133,11 @@ def cost_table(played: dict[str, Evaluation]) -> str:
         rows.append([label, *(f"**{cell}**" if cell.endswith("· 1") else cell for cell in cells)])
     places = np.array([[ranks(each)[name] for name in names] for label, each in played.items() if label != SOUND])
     rows.append(["mean rank over the faults", *(f"{mean:.1f}" for mean in places.mean(axis=0))])
-    return markdown_table(["error + 4 m/mJ · energy, m · rank", *names], rows)
+    return markdown_table(["cost per time step, m (SE) · rank", *names], rows)
 
 
 def measures_table(played: dict[str, Evaluation]) -> str:
-    """RMS, energy and lost periods of every policy in every world."""
+    """RMS, energy and the share of time steps with an error above a sensing radius, of every policy in every world."""
     rows, names = [], played[SOUND].policies
     for label, evaluation in played.items():
         cells = []
@@ -146,7 +146,7 @@ def measures_table(played: dict[str, Evaluation]) -> str:
             rms = np.sqrt((values[0] ** 2).mean())
             cells.append(f"{rms:.2f} / {1e3 * values[1].mean():.0f} / {100 * (1 - values[2].mean()):.1f}")
         rows.append([label, *cells])
-    return markdown_table(["RMS m / energy µJ a period / lost periods %", *names], rows)
+    return markdown_table(["RMS m / energy µJ per time step / error > 10 m, % of time steps", *names], rows)
 
 
 def retrained_table(played: dict[str, Evaluation], trained: list[str]) -> str:
@@ -162,7 +162,7 @@ def retrained_table(played: dict[str, Evaluation], trained: list[str]) -> str:
         rows.append([f"{name}, {SOUND}", saved(name, SOUND), "", ""])
         for fault, settings in STRENGTHS.items():
             rows.append([f"{name}, {fault}", *(saved(name, f"{fault}, {setting}") for setting in settings)])
-    return markdown_table(["less cost than ppo", "weak", "middling", "strong"], rows)
+    return markdown_table(["cost reduction against ppo", "weak", "middling", "strong"], rows)
 
 
 def filter_table(filters: dict[tuple[str, str], Evaluation]) -> str:
@@ -177,7 +177,7 @@ def filter_table(filters: dict[tuple[str, str], Evaluation]) -> str:
             cells.append(f"{Measured.mean(rms)} / {100 * lost:.1f}")
         rows.append([words, *cells])
     columns = [text.replace(",", ", ") or SOUND for text in FILTERED]
-    return markdown_table(["RMS m / lost periods %", *columns], rows)
+    return markdown_table(["RMS m / error > 10 m, % of time steps", *columns], rows)
 
 
 def draw_costs(played: dict[str, Evaluation], path: Path) -> None:

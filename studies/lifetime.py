@@ -1,4 +1,4 @@
-"""How long networks last: rules and learned policies at fixed and at steered prices of energy, in Lifetime-v0.
+"""How long networks last: heuristic and learned policies at fixed and at steered prices of energy, in Lifetime-v0.
 
     python -m studies.lifetime --out out/lifetime
 
@@ -15,6 +15,7 @@ import numpy as np
 import tyro
 
 from studies.tables import play
+from wsn_env.envs.rendering.colours import LINES
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.intervals import Measured, Summary
 from wsn_env.evaluation.progress import progress_bar
@@ -35,7 +36,7 @@ def _steered(label: str) -> str:
 
 PLAIN = ("static_cluster", "pre_dc", "pre_dc:least_left=0.2", "nearest0", "nearest1", "nearest2")
 RIVALS = {  # of the learned policy, each the best of its kind in hindsight, at every battery anew
-    "the best of the rules at no price of their own": PLAIN,
+    "best baseline that ignores energy prices": PLAIN,
     "greedy at its best fixed price": tuple(f"greedy, price {price}" for price in PRICES),
     "ppo of PreDC-v0 at its best fixed price": tuple(f"ppo of PreDC-v0, price {price}" for price in PRICES),
     "greedy at a steered price": (_steered("greedy"),),
@@ -64,7 +65,7 @@ def policies() -> dict[str, str]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Play, print and write batteries.md, learned.md and metrics.md."""
+    """Play, print and write batteries.md, learned.md, metrics.md and errors.png."""
     asked = tyro.cli(Lifetimes, args=arguments, description=__doc__)
     asked.out.mkdir(parents=True, exist_ok=True)
     errors, metrics, played, named = [], [], {}, policies()
@@ -82,18 +83,56 @@ def main(arguments: list[str] | None = None) -> int:
             share = f"{100 * shown['tracked'].mean():.1f}"
             left = f"{shown['stranded_mj'].mean():.0f}", f"{shown['stranded_sd'].mean():.2f}"
             metrics.append([label, str(Measured.mean(shown["error_m"])), *periods, share, *left])
-    columns = ["first death", "half dead", "functional", "tracked %", "left mJ", "sd of shares left"]
+    columns = [
+        *("first death, step", "half dead, step", "functional lifetime, steps"),
+        *("error <= radius, %", "energy left, mJ", "sd of battery shares left"),
+    ]
     batteries = [f"{each:g} mJ" for each in BATTERIES_MJ]
     tables = {
         "batteries": markdown_table(["capped error m", *batteries], errors),
-        "learned": markdown_table(["ppo's error is less by", *batteries], compare_learned(played)),
+        "learned": markdown_table(["ppo's error is smaller than that of", *batteries], compare_learned(played)),
         "metrics": markdown_table([f"{SHOWN_MJ:g} mJ a node", "capped error m", *columns], metrics),
     }
     for name, text in tables.items():
         with replacing(asked.out / f"{name}.md") as path:
             path.write_text(text, encoding="utf-8")
         print(text)
+    means = {label: [each.mean() for each in found.values()] for label, found in played.items()}
+    draw_errors(means, asked.out / "errors.png")
     return 0
+
+
+def draw_errors(means: dict[str, list[float]], path: Path) -> None:
+    """Picture: error over battery, of the learned policy, of greedy at its prices and of two baselines.
+
+    Args:
+        means: capped error at each of BATTERIES_MJ [m], by label.
+    """
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    fixed = np.min([means[label] for label in RIVALS["greedy at its best fixed price"]], axis=0)
+    lines = {
+        "pre_dc": means["pre_dc"],
+        "nearest0": means["nearest0"],
+        "greedy at its best fixed price, in hindsight": fixed,
+        f"budget ({_steered('greedy')})": means[_steered("greedy")],
+        LEARNED: means[LEARNED],
+    }
+    figure, panel = plt.subplots(figsize=(7, 4.2), layout="constrained")
+    for (label, errors), colour in zip(lines.items(), LINES):
+        panel.plot(BATTERIES_MJ, errors, "o-", color=colour, ms=4, lw=1.5, label=label)
+    panel.set(xscale="log", yscale="log", xlabel="battery of a node [mJ]", ylabel="mean capped error [m]")
+    panel.set_xticks(BATTERIES_MJ, [f"{each:g}" for each in BATTERIES_MJ])
+    panel.set_yticks([1, 2, 5, 10, 15], ["1", "2", "5", "10", "15"])
+    panel.minorticks_off()
+    panel.grid(alpha=0.3, linewidth=0.5)
+    panel.legend(frameon=False)
+    with replacing(path) as temporary:
+        figure.savefig(temporary, dpi=120, format="png")
+    plt.close(figure)
 
 
 def compare_learned(played: dict[str, dict[float, np.ndarray]]) -> list[list[str]]:

@@ -7,10 +7,11 @@ from pkgutil import resolve_name
 
 import pytest
 
-from tests.figures import found_blocks
+from tests.figures import cells, found_blocks, table_lines
 from wsn_env.cli import main
 from wsn_env.envs.registration import IDS
 from wsn_env.evaluation.policies import policy_names
+from wsn_env.papers.claim import HOLDS, NOT_REPRODUCED, UNDER_READING
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -59,6 +60,20 @@ def test_the_tutorials_policy_joins_a_comparison(tmp_path, monkeypatch, capsys):
 def test_no_block_is_empty(page):
     empty = {name for _, name, content in found_blocks(page.read_text()) if not content.strip()}
     assert empty <= {"further"}  # of performance.md: claims without a place of their own
+
+
+def test_the_verdicts_of_the_papers_are_counted_from_their_tables():
+    text, total = (ROOT / "docs" / "reproduction.md").read_text(), [0, 0, 0, 0]
+    for paper in ("pre_dc", "binary", "grnn", "underwater"):
+        page = (ROOT / "docs" / "reproduction" / f"{paper}.md").read_text()
+        claims = next(block for _, name, block in found_blocks(page) if name == f"reproduce/{paper}/claims")
+        verdicts = [cells(line)[-1] for line in table_lines(claims)[2:]]
+        counts = [len(verdicts), *map(verdicts.count, (HOLDS, UNDER_READING, NOT_REPRODUCED))]
+        shown = next(line for line in table_lines(text) if f"(reproduction/{paper}.md)" in line)
+        assert cells(shown)[1:] == [str(count) for count in counts], paper
+        total = [old + new for old, new in zip(total, counts)]
+    assert cells(table_lines(text)[-1]) == ["all", *map(str, total)]
+    assert f"Of their {total[0]} claims {total[1]} hold, {total[2]} hold under a stated reading and {total[3]}" in text
 
 
 def test_the_readme_is_short():

@@ -1,4 +1,4 @@
-"""What docs/reliability.md says: each message as it is, and the trials in a short form."""
+"""What docs/errors.md and docs/reliability.md say: each message as it is, and the trials in a short form."""
 
 import os
 import subprocess
@@ -16,7 +16,7 @@ from tests.figures import DOCS, found_blocks
 
 @pytest.mark.skipif(sys.platform != "linux", reason="systems have words of their own")
 def test_every_message_of_the_page_is_what_is_said():
-    shown = {name: text for _, name, text in found_blocks((DOCS / "reliability.md").read_text())}
+    shown = {name: text for _, name, text in found_blocks((DOCS / "errors.md").read_text())}
     assert shown["reliability/messages"].strip() == messages().strip(), "run `python docs/figures.py reliability`"
 
 

@@ -150,7 +150,7 @@ def test_every_fault_is_played_at_three_strengths(tmp_path, monkeypatch):
     assert faults.STRENGTHS.keys() == FAULTS.kinds.keys()
     assert all(len(settings) == 3 for settings in faults.STRENGTHS.values())
     monkeypatch.setattr(faults, "STRENGTHS", {name: faults.STRENGTHS[name] for name in ("late", "stops")})
-    monkeypatch.setattr(faults, "FILTERS", {"nothing": {}, "gate_sds=3": dict(gate_sds=3.0)})
+    monkeypatch.setattr(faults, "FILTERS", {"plain filter": {}, "gate_sds=3": dict(gate_sds=3.0)})
     monkeypatch.setattr(faults, "POLICIES", ("nearest2", "ppo"))
     trained = tmp_path / "again"
     shutil.copytree(PRETRAINED / "PreDC-v0", trained)

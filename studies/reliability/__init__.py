@@ -1,1 +1,1 @@
-"""What happens when things go wrong: bad input, hostile files, kills, long runs. Renews docs/reliability.md."""
+"""What happens when things go wrong: bad input, hostile files, kills, long runs. For docs/reliability.md, errors.md."""

@@ -1,5 +1,5 @@
-"""What docs/reliability.md says: trials of damaged files, kills, random environments and long runs, and every message
-about bad input.
+"""What docs/reliability.md says: trials of damaged files, kills, random environments and long runs; and docs/errors.md:
+every message about bad input.
 
     python -m studies.reliability --out out/reliability
 
@@ -55,17 +55,17 @@ def files(asked: Reliability, report: Progress) -> tuple[str, list[str]]:
             total = [total[0] + taken, total[1] + refused, total[2] + len(failed)]
             failures += [f"{kind}, {one}" for one in failed]
     rows.append(["all", *(f"{count:,}" for count in total)])
-    return markdown_table(["file", "read", "refused in one line", "anything else"], rows), failures
+    return markdown_table(["file", "accepted", "rejected with one line", "crash or wrong value"], rows), failures
 
 
 def kills(asked: Reliability, report: Progress) -> tuple[str, list[str]]:
     """Commands killed by turns at a file and at a time, and run again."""
     rows, failures, each = [], [], max(1, round(KILLS * asked.share))
-    for number, (name, command) in enumerate(COMMANDS.items()):
+    for number, name in enumerate(COMMANDS):
         report(number, len(COMMANDS), name)
         with TemporaryDirectory() as folder:
             found = kill(name, Path(folder), "--random", str(each))
-        rows.append([f"`{command}`", str(found["killed"]), str(len(found["differ"]))])
+        rows.append([name, str(found["killed"]), str(len(found["differ"]))])
         failures += [f"{name}, {one}" for one in found["differ"]]
     return markdown_table(["command", "kills before its end", "files that differ"], rows), failures
 
@@ -80,7 +80,7 @@ def memory(asked: Reliability, report: Progress) -> tuple[str, list[str]]:
         rows.append([f"{steps:,} {name}", f"{early:.1f}", f"{late:.1f}", f"{late / early - 1:+.2%}"])
         if late > FLAT * early:
             failures.append(f"memory: {rows[-1]}")
-    return markdown_table(["run", "MiB after a tenth", "MiB at the end", "growth"], rows), failures
+    return markdown_table(["run", "MiB after 10 %", "MiB at the end", "growth"], rows), failures
 
 
 def worlds(asked: Reliability, report: Progress) -> tuple[str, list[str]]:
@@ -96,7 +96,7 @@ def worlds(asked: Reliability, report: Progress) -> tuple[str, list[str]]:
         report(number - first + 1, most, case.id)
     shown = [[name, *(f"{count:,}" for count in counts)] for name, counts in rows.items()]
     shown.append(["all", *(f"{sum(counts):,}" for counts in zip(*rows.values(), strict=True))])
-    columns = ["preset", "environments made", "refused when made", "periods", "laws broken"]
+    columns = ["preset", "valid scenarios", "rejected", "time steps", "invariants violated"]
     return markdown_table(columns, shown), failures
 
 

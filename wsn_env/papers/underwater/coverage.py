@@ -6,8 +6,8 @@ COVERAGE: tuple[Item, ...] = (
     Item(
         "step: the first head is the node with the strongest signal",
         '`wsn_env/simulation/search.py` (`start="search"`), table first_head. All others begin with a start known'
-        " to 20 m and the node nearest to it: from the 11th period on it makes no difference",
-        "read so",
+        " to 20 m and the node nearest to it: from the 11th time step on it makes no difference",
+        "interpreted",
     ),
     Item(
         "step: every node within one hop of the head is a member",
@@ -25,21 +25,21 @@ COVERAGE: tuple[Item, ...] = (
         "covered",
     ),
     Item(
-        "step: improved resampling: 2n copies bring 2(n - 1) new particles, by adding and subtracting one spread",
+        "step: improved resampling: of 2n copies 2(n - 1) are moved, in pairs by plus and minus one offset",
         '`spread_copies_alike` in `wsn_env/filters/resampling.py` (`resampling="common_spread"`), table resampling;'
         " half the sds of the particles' four components as spread, the j-th pair j times as far",
-        "read so",
+        "interpreted",
     ),
     Item(
         "an odd number of copies",
         "the parent once and pairs about it: `wsn_env/filters/resampling.py`",
-        "read so",
+        "interpreted",
     ),
     Item(
         "step: the head moves with the target to the node with the strongest signal",
-        "`agents/strongest_signal.py`: the strongest signal *reported* in the period before, which is what a network"
+        "`agents/strongest_signal.py`: the strongest signal *reported* in the time step before, which is what a network"
         " can know when it chooses; the target moves 10 m meanwhile",
-        "read so",
+        "interpreted",
     ),
     Item(
         "step: estimate and variance are sent to the next head, which goes on with them",
@@ -58,17 +58,17 @@ COVERAGE: tuple[Item, ...] = (
         "assumption: the received signal",
         "`wsn_env/models/measurement/sonar.py`, `wsn_env/models/acoustics.py`, table acoustics: the sonar equation with"
         " Thorp's absorption, 120 dB at the source, noise of 3 dB",
-        "read so",
+        "interpreted",
     ),
     Item(
         "assumption: the motion",
         "`wsn_env/models/motion/cruise.py`: nearly constant velocity in two dimensions, depth from a pressure gauge",
-        "read so",
+        "interpreted",
     ),
     Item(
         "assumption: energy",
         "`wsn_env/models/radio/modem.py`, pictures thresholds and energy: powers and bit rate of a small modem",
-        "read so",
+        "interpreted",
     ),
     Item(
         "quantities of the experiment (field, nodes, period, particles, noise)",
