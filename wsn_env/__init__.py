@@ -12,6 +12,9 @@ from wsn_env.envs.registration import register_envs
 
 if TYPE_CHECKING:
     from wsn_env.envs.env import ClusterEnv as ClusterEnv
+    from wsn_env.envs.multi_env import MultiEnv as MultiEnv
+    from wsn_env.envs.multi_env import MultiVectorEnv as MultiVectorEnv
+    from wsn_env.envs.parallel_env import parallel_env as parallel_env
     from wsn_env.envs.registration import register as register
     from wsn_env.envs.vector_env import ClusterVectorEnv as ClusterVectorEnv
     from wsn_env.evaluation.as_policy import as_policy as as_policy
@@ -43,6 +46,9 @@ _HOMES = {
     "Outcome": "wsn_env.models.state",
     "ClusterEnv": "wsn_env.envs.env",
     "ClusterVectorEnv": "wsn_env.envs.vector_env",
+    "MultiEnv": "wsn_env.envs.multi_env",
+    "MultiVectorEnv": "wsn_env.envs.multi_env",
+    "parallel_env": "wsn_env.envs.parallel_env",
     "evaluate": "wsn_env.evaluation.comparison",
     "as_policy": "wsn_env.evaluation.as_policy",
     "error_bound": "wsn_env.evaluation.bound",

@@ -38,6 +38,16 @@ def key_of_seed(seed: int) -> np.uint64:
     return episode_key(np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed))))
 
 
+def target_keys(keys: np.ndarray, targets: int) -> np.ndarray:
+    """Keys of targets 0, 1, ... of each field, row by row; the first one's is the field's.
+
+    Args:
+        keys: (B * targets,) uint64, each field's as often as it has targets.
+    """
+    steps = np.arange(len(keys), dtype=np.uint64) % np.uint64(targets)
+    return keys ^ (steps * np.uint64(0x9E3779B97F4A7C15))  # `stream` hashes it
+
+
 @piece
 def mix(z: Any) -> Any:
     """SplitMix64's finaliser: a bijection of 64 bits."""

@@ -194,13 +194,14 @@ if hasattr(os, "register_at_fork"):  # not on Windows
     os.register_at_fork(after_in_child=_pools.clear)  # a child has none of its parent's threads
 
 
-def over_rows(kernel: Any, rows: int, threads: int, *arguments: Any) -> int:
+def over_rows(kernel: Any, rows: int, threads: int, *arguments: Any, together: int = 1) -> int:
     """Call kernel(start, stop, *arguments) over 0..rows, shared among threads.
 
     Args:
         kernel: works on rows start..stop - 1 only.
         rows: B.
         threads: how many to use at most; a small batch stays in the caller's.
+        together: rows 0..together - 1 are one thread's, and so on.
 
     Returns: the sum of what the calls return (rows that they count), 0 for nothing.
     """
@@ -208,7 +209,7 @@ def over_rows(kernel: Any, rows: int, threads: int, *arguments: Any) -> int:
         return kernel.call(0, rows, *arguments) or 0
     if threads not in _pools:
         _pools[threads] = ThreadPoolExecutor(threads - 1, thread_name_prefix="wsn_env")
-    bounds = [rows * i // threads for i in range(threads + 1)]
+    bounds = [rows // together * i // threads * together for i in range(threads + 1)]
     others = [_pools[threads].submit(kernel, a, b, *arguments) for a, b in zip(bounds[1:], bounds[2:]) if b > a]
     own = kernel(0, bounds[1], *arguments) or 0
     return own + sum(job.result() or 0 for job in others)

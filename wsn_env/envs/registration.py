@@ -11,15 +11,25 @@ from gymnasium.envs.registration import parse_env_id, registry
 PRESETS = Path(__file__).parents[1] / "scenario" / "presets"
 
 IDS = tuple(sorted(path.stem.replace("_", "-") for path in PRESETS.glob("*_v*.py")))  # without importing them
+MULTI = "wsn_env/Multi-v0"
 CONTINUOUS = {f"{name.rpartition('-')[0]}Continuous-{name.rpartition('-')[2]}": name for name in IDS}
 
 
 def register_envs() -> None:
-    """Make the presets' ids known to gym.make, and `wsn_env/<name>Continuous-v0` of each, with action "scores"."""
+    """Make the presets' ids known to gym.make, `wsn_env/<name>Continuous-v0` of each, with action "scores",
+    and Multi-v0."""
     for name in IDS:
         _register(f"wsn_env/{name}", {"scenario": name})
     for name, scenario in CONTINUOUS.items():
         _register(f"wsn_env/{name}", {"scenario": scenario, "action": "scores"})
+    several = "wsn_env.envs.multi_env"
+    if MULTI not in registry:
+        gym.register(
+            MULTI,
+            f"{several}:MultiEnv",
+            vector_entry_point=f"{several}:MultiVectorEnv",
+            kwargs={"scenario": "PreDC-v0", "targets": 3},
+        )
 
 
 def register(id: str, **arguments: Any) -> None:

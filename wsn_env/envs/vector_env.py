@@ -15,7 +15,7 @@ from gymnasium.vector.utils import batch_space
 from wsn_env.compiled import draws
 from wsn_env.envs.actions import ActionName
 from wsn_env.envs.info import outcomes_by_name
-from wsn_env.envs.interface import Interface, Settings, check_options, scenario_of
+from wsn_env.envs.interface import Interface, Settings, check_one_target, check_options, scenario_of
 from wsn_env.envs.observations import Follower, ObservationName
 from wsn_env.envs.one_thread import Busy, one_thread
 from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera, RenderMode
@@ -51,6 +51,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
 
+    takes_several_targets = False  # a row for each
     _spec: EnvSpec | None = None
 
     @checked_but("num_envs", "candidates", "frame_px", "threads", "max_episode_steps")
@@ -77,6 +78,8 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         self.metadata = type(self).metadata | {"autoreset_mode": self.autoreset_mode}
         self.render_mode: RenderMode | None = render_mode
         self.scenario: Scenario = scenario_of(scenario, overrides, type(self))
+        if not self.takes_several_targets:
+            check_one_target(self.scenario)
         self._camera = None if render_mode is None else Camera(self.scenario, render_mode, frame_px)
         self.world: World = World(self.scenario, threads, fast)
         settings = Settings(action, observation, reward, order, candidates)
@@ -146,10 +149,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
 
     def _restart(self, rows: np.ndarray) -> dict[str, np.ndarray]:
         """Begin episodes in some rows; gives the info, which is theirs alone."""
-        keys = np.zeros(self.num_envs, np.uint64)
-        for i in np.flatnonzero(rows):
-            keys[i] = draws.episode_key(cast(np.random.Generator, self._generators[i]))
-        outcome = self.world.restart(self._state, rows, keys, donate=True)[1]
+        outcome = self.world.restart(self._state, rows, self._draw_keys(rows), donate=True)[1]
         self._squares[rows] = self._energy_mj[rows] = 0.0
         self._detections[rows] = 0
         self._ended = self._ended & ~rows
@@ -159,6 +159,13 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         if self._camera is not None:
             self._camera.begin(self._state, outcome, rows)
         return info
+
+    def _draw_keys(self, rows: np.ndarray) -> np.ndarray:
+        """(B,) of the next episodes in the rows marked, each from its row's generator."""
+        keys = np.zeros(self.num_envs, np.uint64)
+        for i in np.flatnonzero(rows):
+            keys[i] = draws.episode_key(cast(np.random.Generator, self._generators[i]))
+        return keys
 
     @one_thread
     def step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:

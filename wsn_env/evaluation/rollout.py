@@ -30,11 +30,11 @@ def evaluation_seeds(seed: int, episodes: int) -> list[int]:
 def episodes(
     policy: Policy, world: World, seeds: Sequence[int], begin: Callable[[State, Outcome], object] | None = None
 ) -> Iterator[tuple[State, Outcome]]:
-    """Play one episode for each seed, a row each; gives state and outcome after every period.
+    """Play one episode for each seed, a row for each of its targets; gives state and outcome after every period.
 
     `begin` is called with state and outcome before the first: those of `World.restart`.
     """
-    keys = np.array([draws.key_of_seed(seed) for seed in seeds], dtype=np.uint64)
+    keys = np.repeat([draws.key_of_seed(seed) for seed in seeds], world.scenario.targets)
     state, outcome = world.restart(world.allocate(len(keys)), np.ones(len(keys), bool), keys, donate=True)
     if begin is not None:
         begin(state, outcome)
@@ -76,17 +76,19 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
     outside the field all means are over the periods played, and the sums hold the charge for those left.
 
     `error_m` is the mean of errors as they count (`Scenario.counted_m`), `rms_m` of errors as they are. How long the
-    network lasted is told by `lifetimes`.
+    network lasted is told by `lifetimes`. With several targets errors are means over them, counts, energies and returns
+    sums.
     """
-    scenario = world.scenario
+    scenario, targets = world.scenario, world.scenario.targets
+    rows = len(seeds) * targets
     names = "error", "square", "energy", "members", "handovers", "searches", "lost"
     sums: dict[str, Any] = dict.fromkeys(names, 0.0)
-    counted_periods, ratios = np.zeros(len(seeds)), np.zeros(len(seeds))
-    regular_periods, nees_sums = np.zeros(len(seeds)), np.zeros(len(seeds))
-    reference = Reference(scenario, len(seeds), world.threads) if has_reference(scenario) else None
+    counted_periods, ratios = np.zeros(rows), np.zeros(rows)
+    regular_periods, nees_sums = np.zeros(rows), np.zeros(rows)
+    reference = Reference(scenario, rows, world.threads) if has_reference(scenario) else None
     begin = None if reference is None else lambda state, _: reference.begin(state)
-    playing, played = np.ones(len(seeds), bool), np.zeros(len(seeds), int)
-    lives: dict[str, np.ndarray] = dict.fromkeys(METRICS, np.zeros(len(seeds)))
+    playing, played = np.ones(rows, bool), np.zeros(rows, int)
+    lives: dict[str, np.ndarray] = dict.fromkeys(METRICS, np.zeros(rows))
     for state, outcome in episodes(policy, world, seeds, begin):
         square, believed = outcome.error_m**2, outcome.posterior_rms_m**2
         played += playing
@@ -97,7 +99,7 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
             nees_sums += playing * nees
             regular_periods += playing & regular
             counted_periods += playing & (believed > 0)
-            ratios += np.divide(square, believed, out=np.zeros(len(seeds)), where=playing & (believed > 0))
+            ratios += np.divide(square, believed, out=np.zeros(rows), where=playing & (believed > 0))
         sums["energy"] += playing * outcome.energy_mj
         sums["members"] += playing * outcome.members
         sums["handovers"] += playing & outcome.handover
@@ -129,12 +131,30 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
         "searches": sums["searches"].astype(int),
         "lost": sums["lost"].astype(int),
         **lives,
-        "reference_m": np.full(len(seeds), "") if reference is None else reference.episode_m(),
-        "reference_all_awake_m": np.full(len(seeds), "") if reference is None else reference.all_awake_m(state),
+        "reference_m": np.full(rows, "") if reference is None else reference.episode_m(),
+        "reference_all_awake_m": np.full(rows, "") if reference is None else reference.all_awake_m(state),
         "anees": nees_sums / np.maximum(regular_periods, 1),
         "variance_ratio": ratios / np.maximum(counted_periods, 1),
     }
+    if targets > 1:
+        columns = {name: _over_targets(name, values.reshape(-1, targets)) for name, values in columns.items()}
     return [{name: values[i].item() for name, values in columns.items()} for i in range(len(seeds))]
+
+
+SUMS = "return", "sum_error_m", "sum_energy_mj", "energy_mj", "members", "handovers", "searches", "lost"
+MEANS = "error_m", "tracked", "anees", "variance_ratio"
+ROOT_MEAN_SQUARES = "rms_m", "reference_m", "reference_all_awake_m"
+
+
+def _over_targets(name: str, values: np.ndarray) -> np.ndarray:
+    """A column (B, M) of the targets as one of their fields (B,); what they share stands in the last one's."""
+    if name in SUMS:
+        return values.sum(axis=1)
+    if name in MEANS:
+        return values.mean(axis=1)
+    if name in ROOT_MEAN_SQUARES and values.dtype.kind == "f":
+        return np.sqrt((values * values).mean(axis=1))
+    return values.min(axis=1) if name == "functional" else values[:, -1]
 
 
 def _position_nees(state: State, outcome: Outcome) -> tuple[np.ndarray, np.ndarray]:

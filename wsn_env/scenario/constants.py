@@ -104,9 +104,10 @@ def _constants(scenario: Scenario) -> np.ndarray:
     t = scenario.tracking
     types = [(name, constants_type(getattr(scenario, name), scenario)) for name in KINDS]
     plain = [(name, "f8") for name in ("period_s", "radius_m", "reach_m", "ring_m")]
-    made = _zeros([*types, ("tracking", TRACKING), *plain])
+    made = _zeros([*types, ("tracking", TRACKING), ("targets", "i8"), *plain])
     for name in KINDS:
         fill_constants(made[name], getattr(scenario, name), scenario)
+    made["targets"] = scenario.targets
     walks = t.velocity_s is not None
     side_m, depth_m = scenario.field.room_m
     tracking = dict(

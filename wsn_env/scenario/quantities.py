@@ -31,6 +31,7 @@ class Quantities(TypedDict, total=False):
     error_cap_m: float | None
     scarce_energy: bool
     unscored: int
+    targets: int
     ends_outside: bool
     reference_error_m: float
     reference_energy_mj: float

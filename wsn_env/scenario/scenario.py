@@ -85,6 +85,13 @@ class Scenario(Section):
         False, "observations also tell what is left of energy and time", choices=(True, False)
     )
     unscored: int = quantity(0, "periods at the start that rms_m leaves out: acquisition", at_least=0, whole=True)
+    targets: int = quantity(
+        1,
+        "targets in a field, each with its track, belief and cluster; nodes and batteries are shared",
+        at_least=1,
+        at_most=1000,
+        whole=True,
+    )
     ends_outside: bool = quantity(
         False,
         "an episode ends in the period in which the target is outside the field: tracks are neither reflected at the"
@@ -124,6 +131,21 @@ class Scenario(Section):
         for part in checked:
             part.check(self)
         self.motion.check_measurement(self.measurement)
+        if self.targets > 1:
+            self._check_several_targets()
+
+    def _check_several_targets(self) -> None:
+        """Raise ScenarioError for what is made for one."""
+        m = self.measurement
+        one = {
+            f"measurement = {type(m).__name__}, which tells nothing of whom it is": m.reports_state or m.lasting_errors,
+            "faults": any(fault.strikes for fault in self.faults),
+            "ends_outside = True": self.ends_outside,
+            "motion = Replay": m.packets_of(self) is not None,
+        }
+        for what, given in one.items():
+            if given:
+                raise ScenarioError(f"Scenario.targets = {self.targets}: must be 1 with {what}")
 
     def _take_faults(self) -> None:
         """One fault, or a list of them, is a tuple."""

@@ -30,6 +30,7 @@ START = record(
         ("side_m", "f8"),
         ("depth_m", "f8"),
         ("search_gap", "i8"),
+        ("targets", "i8"),
     ]
 )
 
@@ -43,7 +44,7 @@ def start_record(scenario: Scenario) -> np.ndarray:
     made["sd_ms"] = scenario.tracking.start_sd_ms if known else scenario.tracking.rest_sd_ms
     made["battery_j"], made["lam"] = span(scenario.radio.battery_j), scenario.lam_range
     made["side_m"], made["depth_m"] = scenario.field.room_m
-    made["search_gap"] = scenario.tracking.search_gap
+    made["search_gap"], made["targets"] = scenario.tracking.search_gap, scenario.targets
     made["grid"], made["jitter"] = scenario.field.layout == "grid", scenario.field.jitter
     if scenario.field.field_seed is not None:
         made["seeded"] = 1
@@ -67,24 +68,28 @@ def begin(
     placed: np.ndarray,
     handle: np.ndarray,
 ) -> None:
-    """Field, batteries, lam and the first belief of new episodes, whose tracks have been drawn."""
+    """Field, batteries, lam and the first belief of new episodes, whose tracks have been drawn.
+
+    What the targets of a field share is drawn by the key of the first.
+    """
     state, s = state_at(handle), starts[0]
     for b in range(start, stop):
         clear_ledger(state.ledger, b)
         if not rows[b]:
             continue
         key, row, network, belief = keys[b], state.row[b], state.network, state.belief.row[b]
+        shared = keys[b - b % s.targets]
         state.key[b] = key
         row.period = 0
         row.log_miss = 0.0
         row.last_search = -s.search_gap
-        row.lam = _draw_between(s.lam, key, draws.LAM)
-        row.full_j = _draw_between(s.battery_j, key, draws.BATTERY)
+        row.lam = _draw_between(s.lam, shared, draws.LAM)
+        row.full_j = _draw_between(s.battery_j, shared, draws.BATTERY)
         if len(placed) > 0:
             for i in range(len(placed)):
                 network.positions[b, i, 0], network.positions[b, i, 1] = placed[i, 0], placed[i, 1]
         else:
-            field_stream = draws.stream(s.field_key if s.seeded else key, 0, draws.FIELD)
+            field_stream = draws.stream(s.field_key if s.seeded else shared, 0, draws.FIELD)
             if s.grid:
                 lay_out(field_stream, s.side_m, s.jitter, network.positions[b])
             else:

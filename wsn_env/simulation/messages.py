@@ -21,11 +21,13 @@ SENSING, HANDOVER, INVITATION, REPORT, BROADCAST, SEARCH = np.arange(6)
 
 
 class Episode(NamedTuple):
-    """One of a batch of episodes, in a period."""
+    """A target of one of a batch of episodes, in a period."""
 
     state: Any  # State of all of them
     b: int  # its row
     out: Any  # its OUTCOME
+    first: int  # the rows from this one on, so many as there are targets, are of its field: they share nodes, batteries
+    targets: int
 
 
 @lean_piece
@@ -38,18 +40,19 @@ def spend(node: Any, joules: float, purpose: Any, episode: Episode) -> bool:
 @lean_piece
 def _charge(node, joules, purpose, episode):
     """Charge a node without telling the network."""
-    state, b, out = episode
-    residual_j, ledger = state.residual_j[b], state.ledger
-    before = residual_j[node]
-    residual_j[node] = max(before - joules, 0.0)
-    paid = before - residual_j[node]
+    state, b, out = episode.state, episode.b, episode.out
+    ledger, before = state.ledger, state.residual_j[b, node]
+    left = max(before - joules, 0.0)
+    paid = before - left
     if paid > 0.0:
+        for row in range(episode.first, episode.first + episode.targets):
+            state.residual_j[row, node] = left
+            state.living[row] -= left == 0.0
         if ledger.spent_j[b, node] == 0.0:
             ledger.charged[b, ledger.count[b]] = node
             ledger.count[b] += 1
         ledger.spent_j[b, node] += paid
         out.energy_j[purpose] += paid
-        state.living[b] -= residual_j[node] == 0.0
     return before >= joules
 
 
@@ -67,11 +70,12 @@ def note_residual(node: Any, episode: Episode) -> None:
 
 @lean_piece
 def _note_battery(node, left_j, episode):
-    network, b = episode.state.network, episode.b
-    before = network.battery[b, node]
-    network.row[b].alive -= before > 0.0 and left_j == 0.0
-    network.row[b].left_j = max(network.row[b].left_j - (before - left_j), 0.0)  # a sum: rounded
-    network.battery[b, node] = left_j
+    network = episode.state.network
+    before = network.battery[episode.b, node]
+    for row in range(episode.first, episode.first + episode.targets):
+        network.row[row].alive -= before > 0.0 and left_j == 0.0
+        network.row[row].left_j = max(network.row[row].left_j - (before - left_j), 0.0)  # a sum: rounded
+        network.battery[row, node] = left_j
 
 
 @lean_piece

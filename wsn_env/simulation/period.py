@@ -18,7 +18,7 @@ from wsn_env.simulation.faults import fail_nodes
 from wsn_env.simulation.geometry import nearest_living
 from wsn_env.simulation.lifetime import count_life
 from wsn_env.simulation.messages import Episode
-from wsn_env.simulation.sensing import memory_of, send_late, sense, target_of, wake
+from wsn_env.simulation.sensing import is_awake, memory_of, send_late, sense, target_of, wake
 
 
 @kernel
@@ -40,7 +40,7 @@ def run(
     count = 0
     for b in range(start, stop):
         out = outcomes[b]
-        episode = Episode(state, b, out)
+        episode = Episode(state, b, out, b - b % c.targets, c.targets)
         _sense_and_report(heads[b], chosen[b], episode, c)
         key, period = state.key[b], state.row[b].period
         if c.tracking.redraw and out.handover:
@@ -71,15 +71,19 @@ def sense_and_report(
     """What comes before the correction, for a tracker that is not compiled."""
     state = state_at(handle)
     for b in range(start, stop):
-        _sense_and_report(heads[b], chosen[b], Episode(state, b, outcomes[b]), cs[0])
+        _sense_and_report(
+            heads[b], chosen[b], Episode(state, b, outcomes[b], b - b % cs[0].targets, cs[0].targets), cs[0]
+        )
 
 
 @lean_kernel
 def conclude(start: int, stop: int, cs: Any, resampled: np.ndarray, outcomes: np.ndarray, handle: np.ndarray) -> int:
     """What comes after it; returns how many rows must search."""
-    state, count = state_at(handle), 0
+    state, c, count = state_at(handle), cs[0], 0
     for b in range(start, stop):
-        count += _conclude(resampled[b], Episode(state, b, outcomes[b]), cs[0].radio, cs[0].tracking)
+        count += _conclude(
+            resampled[b], Episode(state, b, outcomes[b], b - b % c.targets, c.targets), c.radio, c.tracking
+        )
     return count
 
 
@@ -111,7 +115,7 @@ def _sense_and_report(head, chosen, episode, c):
         send_late(head, episode, c)
     if head >= 0 and state.residual_j[b, head] <= 0.0:
         messages.note_residual(head, episode)
-    if c.radio.asleep_j > 0.0:
+    if c.radio.asleep_j > 0.0 and b + 1 == episode.first + episode.targets:
         _sleep(episode, c.radio)
     _remember_miss(state, b, c)
 
@@ -119,7 +123,7 @@ def _sense_and_report(head, chosen, episode, c):
 @lean_piece
 def _take_choice(head, chosen, episode, r):
     """Drop what cannot serve, then form the cluster."""
-    state, b, out = episode
+    state, b, out = episode.state, episode.b, episode.out
     network = state.network
     standing, residual_j, predicted = network.row[b], state.residual_j[b], state.belief.row[b].predicted_mean
     stands = standing.head >= 0 and residual_j[standing.head] > 0.0
@@ -183,7 +187,7 @@ def _list_living(chosen, residual_j, found):
 
 @lean_piece
 def _sleep(episode, r):
-    """All nodes outside the cluster that are taken for alive pay for the period, too."""
+    """All nodes outside the field's clusters that are taken for alive pay for the period, too."""
     state, b = episode.state, episode.b
     network, standing = state.network, state.network.row[b]
     battery, members, j = network.battery[b], network.members[b], 0
@@ -191,6 +195,8 @@ def _sleep(episode, r):
         while j < standing.n_members and members[j] < node:
             j += 1
         awake = node == standing.head or (j < standing.n_members and members[j] == node)
+        for row in range(episode.first, b):
+            awake |= is_awake(node, network, row)
         if not awake and battery[node] > 0.0:
             messages.spend(node, r.asleep_j, messages.SENSING, episode)
 
@@ -211,7 +217,7 @@ def _remember_miss(state, b, c):
 def _conclude(resampled, episode, r, t):
     """After the correction: the broadcast, and the end of the period unless a search must come first; returns
     whether it must, as the outcome's `searched` does."""
-    state, b, out = episode
+    state, b, out = episode.state, episode.b, episode.out
     if resampled and state.network.row[b].head >= 0:
         out.resampled = True
         if r.to_head:
@@ -235,19 +241,23 @@ def _is_lost(state, b, t):
 @lean_kernel
 def settle(start: int, stop: int, cs: Any, rows: np.ndarray, outcomes: np.ndarray, handle: np.ndarray) -> None:
     """The end of the period in the rows marked."""
-    state = state_at(handle)
+    state, c = state_at(handle), cs[0]
     for b in range(start, stop):
         if rows[b]:
-            _settle(Episode(state, b, outcomes[b]), cs[0].radio, cs[0].tracking)
+            _settle(Episode(state, b, outcomes[b], b - b % c.targets, c.targets), c.radio, c.tracking)
 
 
 @lean_piece
 def _settle(episode, r, t):
     """The dead, the costs, and the prediction for the next period (eq. 16)."""
-    state, b, out = episode
+    state, b, out = episode.state, episode.b, episode.out
     belief, target = state.belief.row[b], target_of(state, b)
     mean, cov = belief.mean, belief.cov
     _remove_dead_nodes(episode, r)
+    if state.living[b] < state.residual_j.shape[1]:  # a node that dies leaves the clusters of other targets, too
+        for row in range(episode.first, episode.first + episode.targets):
+            if row != b:
+                _remove_dead_nodes(Episode(state, row, out, episode.first, episode.targets), r)
     if state.row[b].period > 0 and state.reports.count[b] > 0:  # in period 0 nothing was predicted
         note_surprise(belief)
     total = 0.0

@@ -31,7 +31,7 @@ def search(
         out = outcomes[b]
         out.searched = True
         state.row[b].last_search = state.row[b].period
-        episode = Episode(state, b, out)
+        episode = Episode(state, b, out, b - b % c.targets, c.targets)
         strongest = _wake_all(episode, c)
         if strongest >= 0:
             # The new head takes over (the velocity is handed to it) and hears the others.
@@ -61,7 +61,7 @@ def _wake_all(episode, c):
     Returns: the living node with the strongest signal of the target, the first by number where signals are alike; -1:
     nobody detects it.
     """
-    state, b, out = episode
+    state, b, out = episode.state, episode.b, episode.out
     network, standing = state.network, state.network.row[b]
     positions, residual_j, members = network.positions[b], state.residual_j[b], network.members[b]
     target = target_of(state, b)

@@ -20,15 +20,29 @@ def target_of(state: Any, b: int) -> tuple[float, float]:
 
 @lean_piece
 def wake(node: Any, purpose: Any, episode: Episode, r: Any) -> bool:
-    """A node pays for being awake in this period. Returns whether it could."""
+    """A node pays for being awake in this period, once for all targets. Returns whether it could."""
     state, b = episode.state, episode.b
-    return state.residual_j[b, node] > 0.0 and messages.spend(node, r.awake_j, purpose, episode)
+    if state.residual_j[b, node] <= 0.0:
+        return False
+    for row in range(episode.first, b):  # whose periods have begun
+        if is_awake(node, state.network, row):
+            return True
+    return messages.spend(node, r.awake_j, purpose, episode)
+
+
+@lean_piece
+def is_awake(node: Any, network: Any, row: int) -> bool:
+    """Whether a node is in the standing cluster of a row."""
+    found = node == network.row[row].head
+    for k in range(network.row[row].n_members):
+        found |= node == network.members[row, k]
+    return found
 
 
 @lean_piece
 def sense(node: Any, head: Any, purpose: Any, target: Any, episode: Episode, c: Any) -> None:
     """An awake node's period: it reports what it has to tell, if anything."""
-    state, b, out = episode
+    state, b, out = episode.state, episode.b, episode.out
     if state.residual_j[b, node] <= 0.0:
         return
     sensor = node_at(state.network.positions[b], node)

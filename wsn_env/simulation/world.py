@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wsn_env.compiled import kernels
+from wsn_env.compiled import draws, kernels
 from wsn_env.compiled.arrays import blank
 from wsn_env.compiled.kernels import available_threads, over_rows, threads_for
 from wsn_env.filters import make_tracker
@@ -51,15 +51,17 @@ class World:
         """New episodes.
 
         Args:
-            keys: (B,) uint64, one a row: they fix field, track and every draw to come.
+            keys: (B,) uint64, one a row: they fix field, track and every draw to come. With several targets a field
+                has a row for each, one after the other, with one key.
         """
         keys = np.atleast_1d(_keys(keys))
         return self.restart(self.allocate(len(keys)), np.ones(len(keys), bool), keys, donate=True)[0]
 
     def allocate(self, rows: int) -> State:
         """Arrays for `restart` to begin episodes in."""
-        rows = whole_number("rows", rows, 0)
-        s = self.scenario
+        rows, s = whole_number("rows", rows, 0), self.scenario
+        if rows % s.targets:
+            raise ValueError(f"rows = {rows}: must be a multiple of targets = {s.targets}")
         nodes = s.field.nodes
         lengths = dict(rows=rows, nodes=nodes, instants=s.periods + 1, particles=self.tracker.particles)
         if s.tracking.switches:
@@ -88,6 +90,8 @@ class World:
         rows, keys = np.asarray(rows, dtype=bool), _keys(keys)
         if not rows.shape == keys.shape == (state.rows,):
             raise ValueError(f"rows {rows.shape} and keys {keys.shape}: must both be ({state.rows},)")
+        if self.scenario.targets > 1:
+            keys = self._keys_of_targets(rows, keys)
         state = state if donate else state.copy()
         outcome = _nothing_yet(state)
         threads = threads_for(rows, self.threads)
@@ -105,6 +109,14 @@ class World:
             maps, belief = tracker.maps, state.belief
             self._in_rows(rows, period.predict_reports_of_rows, maps, belief.handle, state.network.positions)
         return state, outcome
+
+    def _keys_of_targets(self, rows: np.ndarray, keys: np.ndarray) -> np.ndarray:
+        """(B,) a key for each target, from one for each field."""
+        targets = self.scenario.targets
+        for what, values in (("rows", rows), ("keys", np.where(rows, keys, 0))):
+            if (values.reshape(-1, targets) != values[::targets, None]).any():
+                raise ValueError(f"{what}: must be the same in the {targets} rows of a field, its targets'")
+        return draws.target_keys(keys, targets)
 
     def step(self, state: State, cluster: Cluster, donate: bool = False) -> tuple[State, Outcome]:
         """One sampling period for every row.
@@ -139,7 +151,7 @@ class World:
         # broadcast, costs, and the prediction for the next period, unless a row must search first.
         if isinstance(self.tracker, ParticleTracker):  # all in one compiled call
             arguments = self._constants, state.handle, self.tracker.maps, (heads, members), outcome.row
-            searches = over_rows(self._run, len(heads), self.threads, *arguments)
+            searches = over_rows(self._run, len(heads), self.threads, *arguments, together=self.scenario.targets)
         else:
             self._over_rows(period.sense_and_report, heads, members, outcome.row, state.handle)
             resampled = np.zeros(state.rows, bool)
@@ -166,10 +178,12 @@ class World:
         self.tracker.relocate(state.key, state.period.copy(), found, state.belief)
 
     def _over_rows(self, kernel, *arguments) -> int:
-        return over_rows(kernel, len(arguments[0]), self.threads, self._constants, *arguments)  # all lead with B
+        together = self.scenario.targets
+        return over_rows(kernel, len(arguments[0]), self.threads, self._constants, *arguments, together=together)
 
     def _in_rows(self, rows, kernel, *arguments) -> None:
-        over_rows(kernel, len(rows), threads_for(rows, self.threads), self._constants, rows, *arguments)
+        threads, together = threads_for(rows, self.threads), self.scenario.targets
+        over_rows(kernel, len(rows), threads, self._constants, rows, *arguments, together=together)
 
 
 def _check_state(state: State) -> None:

@@ -1,0 +1,269 @@
+"""Several targets in one field: the bits with one, shared nodes and batteries, and the faces of the environment."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import wsn_env
+from wsn_env import ClusterVectorEnv, MultiEnv, MultiVectorEnv, Scenario, ScenarioError, View, World, make_policy
+from wsn_env.compiled import draws
+from wsn_env.evaluation.comparison import evaluate
+from wsn_env.models.state import Cluster
+
+SMALL = dict(particles=200, periods=30)
+POOR = SMALL | dict(battery_j=0.0003, nodes=100)  # nodes die in dozens
+MODEM = dict(radio="modem", hop_m=200.0, **SMALL)
+
+
+def play(world: World, policy: str, fields: int, seed: int = 0):
+    """State and outcome after every period."""
+    targets, chooser = world.scenario.targets, make_policy(policy, world.scenario)
+    keys = np.repeat([draws.key_of_seed(seed + i) for i in range(fields)], targets)
+    state = world.reset(keys)
+    for _ in range(world.scenario.periods):
+        state, outcome = world.step(state, chooser.act(View.of(state)), donate=True)
+        yield state, outcome
+
+
+@pytest.mark.parametrize("observation", ["candidates", "menu", "dict", "view"])
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
+def test_one_target_is_the_single_targets_environment_to_the_bit(observation, mode):
+    settings = SMALL | dict(observation=observation, autoreset_mode=mode)
+    one, several = ClusterVectorEnv(3, **settings), MultiVectorEnv(3, targets=1, **settings)
+    left, right = one.reset(seed=7), several.reset(seed=7)
+    one.action_space.seed(0)
+    for _ in range(SMALL["periods"] + (0 if mode == "Disabled" else 3)):
+        same_but_for_an_axis(left[0], right[0])
+        actions = one.action_space.sample()
+        left, right = one.step(actions), several.step(actions[:, None])
+        for mine, other in zip(left[1:4], right[1:4], strict=True):
+            assert (mine == other).all()
+        for name, value in left[4].items():
+            if not name.startswith(("_", "final")):
+                assert (value.reshape(3, -1) == right[4][name].reshape(3, -1)).all(), name
+
+
+def same_but_for_an_axis(left, right):
+    if isinstance(left, dict):
+        for name, value in left.items():
+            same_but_for_an_axis(value, right[name])
+    else:
+        assert (left == right[:, 0]).all()
+
+
+@pytest.mark.parametrize("targets", [2, 3, 5])
+def test_the_first_of_several_is_the_single_target_where_energy_lasts(targets):
+    """Fields, tracks, detections and noises are its own; another target changes nothing but batteries."""
+    alone = list(play(World(Scenario.named("PreDC-v0", **SMALL)), "nearest2", 3))
+    world = World(Scenario.named("PreDC-v0", targets=targets, **SMALL))
+    for (one, outcome), (_, joint) in zip(alone, play(world, "nearest2", 3), strict=False):
+        for name in ("error_m", "energy_mj", "estimate_m", "target_m", "delivered"):
+            assert (outcome.row[name] == joint.row[name][::targets]).all()
+        assert (one.key >= 0).all()
+
+
+@pytest.mark.parametrize("targets", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("settings", [SMALL, POOR, MODEM, SMALL | dict(sensing_nj=2000.0)], ids=lambda s: str(len(s)))
+def test_nodes_and_batteries_are_shared(targets, settings):
+    """What all targets' periods cost is what the batteries have lost, at any moment; the dead serve nobody."""
+    scenario = Scenario.named("PreDC-v0", targets=targets, **settings)
+    spent = 0.0
+    for state, outcome in play(World(scenario), "nearest3", 4):
+        spent = spent + outcome.row["energy_mj"].reshape(-1, targets).sum(axis=1)
+        lost = 1e3 * (state.full_j[:, None] - state.residual_j).sum(axis=1)
+        assert lost[::targets] == pytest.approx(spent, rel=1e-9)
+        for name in ("positions", "battery"):
+            shared = getattr(state.network, name).reshape(4, targets, -1)
+            assert (shared == shared[:, :1]).all()
+        assert (state.residual_j.reshape(4, targets, -1) == state.residual_j[::targets, None]).all()
+        assert (state.living == (state.residual_j > 0).sum(axis=1)).all()
+        view = View(state.knowledge)
+        assert (view.network.row["alive"] == view.alive.sum(axis=1)).all()
+        assert view.network.row["left_j"] == pytest.approx(view.battery.sum(axis=1), rel=1e-6, abs=1e-9)
+        assert not (view.member & (state.residual_j <= 0)).any()
+    assert "battery_j" not in settings or (state.living < 100).all()
+
+
+def test_a_node_in_two_clusters_senses_once_and_reports_to_both():
+    """Two targets, the same cluster for both: the sensing is paid once, all else as often as it is done."""
+    settings = SMALL | dict(search=False, sensing_nj=1e5)
+    seeds = dict(keys=np.repeat([draws.key_of_seed(0)], 2))
+    world = World(Scenario.named("PreDC-v0", targets=2, **settings))
+    state = world.reset(**seeds)
+    nodes = np.array([[0, 1, 2], [1, 2, 3]], np.int32)
+    _, outcome = world.step(state, Cluster(nodes[:, 0].astype(np.int64), nodes))
+    sensing_mj = 1e3 * outcome.row["energy_j"][:, 0]
+    assert sensing_mj == pytest.approx([0.3, 0.1])  # 1 and 2 are awake already
+    assert (outcome.row["members"] == 3).all()
+
+
+@pytest.mark.parametrize("policy", ["nearest2", "greedy", "adaptive", "pre_dc", "ppo"])
+def test_a_field_does_not_depend_on_the_batch_or_on_threads(policy):
+    scenario = Scenario.named("PreDC-v0", targets=3, **POOR)
+    *_, (whole, _) = play(World(scenario, threads=2), policy, 7)
+    for fields, threads in ((7, 1), (3, 2), (1, 1)):
+        *_, (part, _) = play(World(scenario, threads=threads), policy, fields)
+        assert (part.belief.mean == whole.belief.mean[: 3 * fields]).all()
+        assert (part.residual_j == whole.residual_j[: 3 * fields]).all()
+
+
+def test_a_copy_goes_on_as_the_original():
+    world = World(Scenario.named("PreDC-v0", targets=3, **POOR))
+    policy = make_policy("nearest3", world.scenario)
+    state = world.reset(np.repeat([draws.key_of_seed(5)], 3))
+    for _ in range(10):
+        state, _ = world.step(state, policy.act(View.of(state)))
+    ends = []
+    for start in (state, state.copy()):
+        own = start
+        for _ in range(10):
+            own, _ = world.step(own, policy.act(View.of(own)))
+        ends.append(own)
+    assert (ends[0].residual_j == ends[1].residual_j).all() and (ends[0].belief.mean == ends[1].belief.mean).all()
+
+
+def test_the_evaluation_is_of_what_the_environment_gives():
+    scenario = Scenario.named("PreDC-v0", targets=3, lam=4.0, **SMALL)
+    evaluation = evaluate(["nearest2"], scenario, episodes=4)
+    policy = make_policy("nearest2", scenario)
+    for row in evaluation.rows:
+        env = MultiEnv("PreDC-v0", targets=3, lam=4.0, **SMALL)
+        env.reset(seed=int(row["seed"]))
+        total, ended = 0.0, False
+        while not ended:
+            _, reward, _, ended, info = env.step(policy.act(env.view))
+            total += reward
+        assert float(row["return"]) == pytest.approx(total, rel=1e-12)
+        assert float(row["rms_m"]) == pytest.approx(np.sqrt((info["episode_rms_m"] ** 2).mean()), rel=1e-12)
+        assert float(row["energy_mj"]) * SMALL["periods"] == pytest.approx(info["episode_energy_mj"], rel=1e-12)
+        assert float(row["reference_m"]) == pytest.approx(np.sqrt((info["episode_reference_m"] ** 2).mean()), rel=1e-12)
+
+
+# --- faces --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("action", ["menu", "subset", "radius", "scores", "nodes", "cluster"])
+@pytest.mark.parametrize("observation", ["candidates", "menu", "dict", "view"])
+def test_gymnasiums_checker(action, observation):
+    env = gym.make("wsn_env/Multi-v0", targets=2, action=action, observation=observation, nodes=30, **SMALL)
+    assert env.spec.max_episode_steps == SMALL["periods"]
+    check_env(env.unwrapped, skip_render_check=True)
+
+
+def test_spaces_have_an_axis_of_targets():
+    env = gym.make("wsn_env/Multi-v0", targets=4)
+    assert env.action_space == gym.spaces.MultiDiscrete([28] * 4)
+    assert env.observation_space.shape == (4, 157) and gym.make("wsn_env/Multi-v0").unwrapped.targets == 3
+    envs = gym.make_vec("wsn_env/Multi-v0", 5, vectorization_mode="vector_entry_point", targets=2, **SMALL)
+    assert envs.observation_space.shape == (5, 2, 157) and envs.action_space.shape == (5, 2)
+    envs.reset(seed=3)
+    *_, info = envs.step(envs.action_space.sample())
+    assert info["error_m"].shape == (5, 2) and info["energy_mj"].shape == (5,) and info["target_m"].shape == (5, 2, 2)
+    assert envs.unwrapped.action_masks().shape == (5, 2, 28)
+
+
+def test_single_and_batch_are_the_same_fields():
+    envs = MultiVectorEnv(3, targets=2, autoreset_mode="Disabled", **SMALL)
+    seen = envs.reset(seed=11)[0]
+    singles = [MultiEnv(targets=2, **SMALL) for _ in range(3)]
+    for i, env in enumerate(singles):
+        assert (env.reset(seed=11 + i)[0] == seen[i]).all()
+    for _ in range(SMALL["periods"]):
+        actions = envs.action_space.sample()
+        seen, rewards, _, truncated, infos = envs.step(actions)
+        for i, env in enumerate(singles):
+            own, reward, _, ended, info = env.step(actions[i])
+            assert (own == seen[i]).all() and reward == rewards[i] and ended == truncated[i]
+    assert info["episode_energy_mj"] == infos["episode_energy_mj"][2]
+    with pytest.raises(gym.error.ResetNeeded):
+        singles[0].step(actions[0])
+
+
+def test_what_is_made_for_one_target_says_so():
+    with pytest.raises(ScenarioError, match="targets = 2: must be 1 here; MultiEnv"):
+        gym.make("wsn_env/PreDC-v0", targets=2)
+    with pytest.raises(ScenarioError, match="targets = 2: must be 1 here; MultiEnv"):
+        ClusterVectorEnv(4, targets=2)
+    for settings in (
+        dict(scenario="Binary-v0"),
+        dict(scenario="Ble-v0"),
+        dict(faults="stuck"),
+        dict(ends_outside=True),
+    ):
+        with pytest.raises(ScenarioError, match="targets = 2: must be 1 with"):
+            MultiEnv(targets=2, **settings)
+    with pytest.raises(ValueError, match="'vector': must be"):
+        MultiEnv(targets=2, reward="vector")
+    with pytest.raises(TypeError, match=r"MultiVectorEnv\(\) got an unexpected keyword argument 'target'"):
+        MultiEnv(target=2)
+    with pytest.raises(ValueError, match=r"shape \(2, 3\): must be \(2, 2, ...\)"):
+        envs = MultiVectorEnv(2, targets=2, **SMALL)
+        envs.reset(seed=0)
+        envs.step(np.zeros((2, 3), int))
+    world = World(Scenario.named("PreDC-v0", targets=3, **SMALL))
+    with pytest.raises(ValueError, match="multiple of targets = 3"):
+        world.allocate(4)
+    with pytest.raises(ValueError, match="same in the 3 rows of a field"):
+        world.reset([1, 2, 3])
+
+
+# --- PettingZoo ---------------------------------------------------------------------------------------------
+
+PARALLEL = (
+    dict(targets=3),
+    dict(targets=2, rewards="own", observation="menu"),
+    dict(targets=2, agents="candidates"),
+    dict(targets=1, action="subset"),
+)
+
+
+@pytest.mark.parametrize("settings", PARALLEL, ids=str)
+def test_pettingzoos_own_tests(settings):
+    test = pytest.importorskip("pettingzoo.test")
+    from pettingzoo.utils import parallel_to_aec
+
+    def make():
+        return wsn_env.parallel_env("Multi-v0", **settings, **SMALL)
+
+    test.parallel_api_test(make(), num_cycles=40)
+    test.parallel_seed_test(make)
+    test.api_test(parallel_to_aec(make()), num_cycles=40)
+    test.seed_test(lambda: parallel_to_aec(make()))
+
+
+def test_agents_have_their_targets_part_of_the_joint_environment():
+    pytest.importorskip("pettingzoo")
+    joint = MultiEnv(targets=3, **SMALL)
+    shared, own = (wsn_env.parallel_env(targets=3, rewards=each, **SMALL) for each in ("shared", "own"))
+    seen = joint.reset(seed=2)[0]
+    for env in (shared, own):
+        assert all((value == seen[k]).all() for k, value in enumerate(env.reset(seed=2)[0].values()))
+    for _ in range(SMALL["periods"]):
+        actions = joint.action_space.sample()
+        seen, reward, _, ended, info = joint.step(actions)
+        for env, per_target in ((shared, False), (own, True)):
+            told, rewards, _, ends, infos = env.step({f"target_{k}": action for k, action in enumerate(actions)})
+            assert all((told[f"target_{k}"] == seen[k]).all() for k in range(3))
+            assert sum(rewards.values()) == pytest.approx(reward if per_target else 3 * reward)
+            assert infos["target_1"]["error_m"] == info["error_m"][1] and set(ends.values()) == {ended}
+    assert shared.agents == []
+
+
+def test_an_agent_for_each_candidate_wakes_by_offering():
+    """All sleep but two; the higher offer leads."""
+    pytest.importorskip("pettingzoo")
+    env = wsn_env.parallel_env(targets=2, agents="candidates", **SMALL)
+    seen, _ = env.reset(seed=0)
+    assert len(env.agents) == 24 and seen["target_0/node_3"].shape == (25 + 11,)
+    actions = dict.fromkeys(env.agents, 0) | {"target_0/node_1": 1, "target_0/node_4": 3, "target_1/node_0": 2}
+    nodes = env.env.view.nearest(12)[0]
+    *_, infos = env.step(actions)
+    view = env.env.view
+    assert view.head.tolist() == [nodes[0, 4], nodes[1, 0]]
+    assert np.flatnonzero(view.member[0]).tolist() == sorted([nodes[0, 1], nodes[0, 4]])
+    assert infos["target_0/node_0"]["members"] == 2 and infos["target_1/node_7"]["members"] == 1
+    with pytest.raises(ValueError, match="agents = 'nodes': allowed are 'targets' and 'candidates'"):
+        wsn_env.parallel_env(agents="nodes")
+    with pytest.raises(ValueError, match="action = 'menu': must be 'scores' with agents = 'candidates'"):
+        wsn_env.parallel_env(agents="candidates", action="menu")
