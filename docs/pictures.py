@@ -1,6 +1,6 @@
 """Pictures of every scenario and of every policy's choice, for the site: frames of the environment itself.
 
-python docs/pictures.py FOLDER    also makes episode.gif, comparison.png and, with chromium, replay.png and report.png
+python docs/pictures.py FOLDER    also makes the pictures of README, index, targets and, with chromium, of pages
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from PIL import Image
 
-from wsn_env import Scenario, View, World, evaluate, make_policy
+from wsn_env import MultiEnv, Scenario, View, World, evaluate, make_policy
 from wsn_env.compiled import draws
 from wsn_env.envs.registration import IDS
 from wsn_env.envs.rendering.camera import Camera
@@ -85,6 +85,16 @@ def draw_all(folder: Path) -> None:
             draw(name, policy, path)
 
 
+def several_targets(path: Path, targets: int = 3, seed: int = 2, periods: int = 40) -> None:
+    """A frame of a field with several targets."""
+    env = MultiEnv("PreDC-v0", targets=targets, render_mode="rgb_array")
+    policy = make_policy("nearest3", env.scenario)
+    env.reset(seed=seed)
+    for _ in range(periods):
+        env.step(policy.act(env.view))
+    Image.fromarray(env.render()).save(path)
+
+
 def compare(path: Path, episodes: int = 1000) -> None:
     """The landing page's picture of error against energy."""
     rules = "greedy adaptive pre_dc strongest centroid static_cluster".split()
@@ -115,5 +125,6 @@ if __name__ == "__main__":
     draw_all(Path(sys.argv[1]))
     film(Path(sys.argv[1]) / "episode.gif")
     compare(Path(sys.argv[1]) / "comparison.png")
+    several_targets(Path(sys.argv[1]) / "targets.png")
     if which("chromium"):
         photograph_pages(Path(sys.argv[1]).absolute())

@@ -367,4 +367,4 @@ def test_labels_are_shown_as_they_are(label, tmp_path, capsys):
     for more in ([], ["--pareto"]):
         command = ["evaluate", "--policies", *policies, "--lam", "1", "--episodes", "2", *more, *SMALL]
         assert main(command) == 0
-        assert f"{label} - " in capsys.readouterr().out
+        assert f"to {label}" in capsys.readouterr().out

@@ -50,6 +50,25 @@ def test_a_replay_tells_what_the_evaluation_does(name, tmp_path):
         )
 
 
+def test_several_targets_are_replayed(tmp_path):
+    scenario = Scenario.named("PreDC-v0", targets=3, particles=300, battery_j=5e-4)
+    policy = make_policy("nearest3", scenario)
+    replay({"nearest3": policy}, scenario, SEED, tmp_path / "replay.html")
+    data = data_of(tmp_path / "replay.html")
+    row = next(row for row in evaluate(["nearest3"], scenario, episodes=3).rows if row["seed"] == SEED)
+    (episode,) = data["episodes"]
+    assert len(data["tracks"]) == 3 == len({tuple(track) for track in data["tracks"]})
+    assert episode["rms_m"] == pytest.approx(row["rms_m"])
+    assert episode["total"] == pytest.approx(row["return"]) and episode["energy_mj"] == pytest.approx(row["energy_mj"])
+    left = np.full(scenario.field.nodes, 5e-4)
+    for frame in episode["frames"]:
+        assert len(frame["targets"]) == 3
+        for node, battery in frame["left_j"]:
+            left[node] = battery
+    *_, (state, _) = episodes(policy, World(scenario), [SEED])
+    np.testing.assert_allclose(left, state.residual_j[2], rtol=1e-6)
+
+
 @pytest.mark.parametrize("start", ["known", "search"])
 def test_batteries_are_the_worlds_to_the_last_node(start, tmp_path):
     scenario = Scenario.named("PreDC-v0", battery_j=1e-4, particles=300, start=start)
@@ -72,7 +91,7 @@ def test_what_a_search_costs_and_wakes_is_shown(tmp_path):
     frames = data_of(out)["episodes"][0]["frames"]
     searches = [frame for frame in frames if frame["search"]]
     assert frames[0]["search"] and len(searches) > 1
-    assert all(frame["awake"] == scenario.field.nodes > len(frame["members"]) + 1 for frame in searches)
+    assert all(frame["awake"] == scenario.field.nodes > len(frame["targets"][0]["members"]) + 1 for frame in searches)
     spent = [frame["energy"] for frame in frames]
     assert spent[0] > 1 and np.mean(spent[1:]) == pytest.approx(recording.episodes[0].energy_mj, rel=1e-3)
 
@@ -81,7 +100,7 @@ def test_binary_sensors_that_report_nothing_there_have_no_ring(tmp_path):
     scenario = Scenario.named("Binary-v0", periods=20)
     replay({"boundary": make_policy("boundary", scenario)}, scenario, 0, tmp_path / "replay.html")
     data = data_of(tmp_path / "replay.html")
-    frames = data["episodes"][0]["frames"]
+    frames = [frame["targets"][0] for frame in data["episodes"][0]["frames"]]
     assert all(set(frame["detects"]) <= {*frame["heard"], *frame["members"], frame["head"]} for frame in frames)
     assert any(set(frame["heard"]) - set(frame["detects"]) for frame in frames)
     assert ["heard", "detects"] in data["legend"]
@@ -96,7 +115,8 @@ def test_a_recorded_track_is_replayed(tmp_path, capsys):
     assert "strongest:n=3: RMS" in capsys.readouterr().out
     data = data_of(out)
     assert len(data["nodes"]) == 2 * 12 and data["receiver"] == "sink"
-    assert all({frame["head"], *frame["members"]} >= set(range(12)) for frame in data["episodes"][0]["frames"][1:])
+    own = [frame["targets"][0] for frame in data["episodes"][0]["frames"][1:]]
+    assert all({frame["head"], *frame["members"]} >= set(range(12)) for frame in own)
 
 
 @pytest.mark.parametrize(
@@ -256,7 +276,7 @@ def test_hovering_shows_a_node(opened):
 
     browser, data = opened
     browser.execute_script("seek(30)")
-    head = data["episodes"][0]["frames"][30]["head"]
+    head = data["episodes"][0]["frames"][30]["targets"][0]["head"]
     x, y, canvas = browser.execute_script(
         "const [x, y] = scaleOf(views[0].canvas.getBoundingClientRect().width)(nodes[arguments[0]]);"
         "return [x, y, views[0].canvas]",
@@ -278,7 +298,8 @@ def test_a_search_wakes_every_node_that_one_hovers_over(browser, tmp_path):
     replay({"nearest0": make_policy("nearest0", scenario)}, scenario, 0, out)
     frames = data_of(out)["episodes"][0]["frames"]
     k = next(k for k, frame in enumerate(frames) if k and frame["search"])
-    asleep = next(n for n in range(scenario.field.nodes) if all(n not in (f["head"], *f["members"]) for f in frames))
+    own = [frame["targets"][0] for frame in frames]
+    asleep = next(n for n in range(scenario.field.nodes) if all(n not in (f["head"], *f["members"]) for f in own))
     browser.get(out.as_uri())
     caption = browser.find_element("css selector", "figcaption")
     assert "225 awake" in caption.text and "search" in caption.text

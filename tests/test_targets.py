@@ -267,3 +267,25 @@ def test_an_agent_for_each_candidate_wakes_by_offering():
         wsn_env.parallel_env(agents="nodes")
     with pytest.raises(ValueError, match="action = 'menu': must be 'scores' with agents = 'candidates'"):
         wsn_env.parallel_env(agents="candidates", action="menu")
+
+
+# --- pictures -------------------------------------------------------------------------------------------------
+
+
+def test_a_frame_shows_every_target():
+    """Where each target is, and its head; a frame of the first target alone is the single environment's."""
+    settings = SMALL | dict(render_mode="rgb_array", frame_px=400)
+    env, one = MultiEnv(targets=3, **settings), wsn_env.ClusterEnv(**settings)
+    policy = make_policy("nearest2", env.scenario)
+    env.reset(seed=3), one.reset(seed=3)
+    for _ in range(12):
+        env.step(policy.act(env.view))
+        one.step(policy.act(one.view))
+    picture = env.render()
+    assert picture.shape == (400, 400, 3)
+    changed = (picture != one.render()).any(axis=2)
+    rows, columns = np.nonzero(changed[60:340])
+    assert len(rows) > 500  # two more targets with their clusters
+    envs = MultiVectorEnv(2, targets=3, **settings)
+    envs.reset(seed=3)
+    assert len(envs.render()) == 2

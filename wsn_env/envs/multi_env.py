@@ -145,7 +145,7 @@ class MultiVectorEnv(gym.vector.VectorEnv):
         return self._fold(self.rows.action_masks())
 
     def render(self) -> Any:
-        """As ClusterVectorEnv, a frame of each target: (B * M) of them."""
+        """As ClusterVectorEnv, a frame of each field with all its targets."""
         return self.rows.render()
 
     def close_extras(self, **kwargs: Any) -> None:
@@ -243,8 +243,9 @@ class MultiEnv(gym.Env):
         return self.fields.action_masks()[0]
 
     def render(self) -> Any:
-        """A tuple of M frames."""
-        return self.fields.render()
+        """A frame (frame_px, frame_px, 3) uint8 of the field with all targets; in "human" mode None."""
+        frames = self.fields.render()
+        return None if frames is None else frames[0]
 
     def close(self) -> None:
         """Close the window, if there is one."""

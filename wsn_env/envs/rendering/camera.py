@@ -57,14 +57,14 @@ class Camera:
         self._trail.add(state, outcome)
 
     def frames(self, state: State, size: int | None = None) -> tuple[np.ndarray, ...]:
-        """(size, size, 3) uint8 of each row; size: frame_px unless given."""
-        trail, size = self._trail, size or self.frame_px
-        return tuple(frame(state, self.scenario, trail, row, size) for row in range(state.rows))
+        """(size, size, 3) uint8 of each field; size: frame_px unless given."""
+        trail, size, fields = self._trail, size or self.frame_px, range(0, state.rows, self.scenario.targets)
+        return tuple(frame(state, self.scenario, trail, row, size) for row in fields)
 
     def show(self, state: State) -> None:
         """Show all rows in the window, if it is to have one."""
         if self._window is not None:
-            columns = ceil(state.rows**0.5)
+            columns = ceil((state.rows // self.scenario.targets) ** 0.5)
             size = self.frame_px if columns == 1 else max(min(self.frame_px, WIDEST // columns), SMALLEST)
             self._window.show(tile_frames(self.frames(state, size)))
 

@@ -35,13 +35,18 @@ FADED = 0.2  # the opacity of a tail's beginning
 
 
 class Scene(NamedTuple):
-    """What a frame shows: an environment of a batch."""
+    """What a frame shows of a target."""
 
     state: State  # after the period
     scenario: Scenario
     trail: Trail  # of the periods up to this one
     row: int  # of the batch
     nodes: np.ndarray  # (S, 2) px, where they stand on the frame
+
+    @property
+    def view(self) -> View:
+        """What the network knows."""
+        return View(self.state.only(self.row).knowledge)
 
     @property
     def last(self) -> np.void:
@@ -65,7 +70,8 @@ class Scene(NamedTuple):
 
 
 def frame(state: State, scenario: Scenario, trail: Trail, row: int = 0, size: int = SIZE) -> np.ndarray:
-    """A frame (size, size, 3) uint8 of a row. Nothing but the arguments decides a pixel, and none is changed.
+    """A frame (size, size, 3) uint8 of a row, or of the field of several targets that begins with it. Nothing but the
+    arguments decides a pixel, and none is changed.
 
     Args:
         state: after the period.
@@ -76,22 +82,20 @@ def frame(state: State, scenario: Scenario, trail: Trail, row: int = 0, size: in
     """
     plan = plan_of(size, scenario.name, scenario.field.room_m, legend(scenario))
     canvas = Canvas(plan.paper.copy())
-    scene = Scene(state, scenario, trail, row, plan.pixels(state.network.positions[row]))
-    _write_head(canvas, plan, scene)
-    if scene.last["searched"]:
+    nodes = plan.pixels(state.network.positions[row])
+    scenes = [Scene(state, scenario, trail, k, nodes) for k in range(row, row + scenario.targets)]
+    _write_head(canvas, plan, scenes)
+    if any(scene.last["searched"] for scene in scenes):
         _flash(canvas, plan)
-    view = View(state.only(row).knowledge)
-    awake, sees = np.flatnonzero(view.member[0]), np.flatnonzero(view.sees[0])
+    awake = np.flatnonzero(np.any([scene.view.member[0] for scene in scenes], axis=0))
     if len(awake) and shows_radius(scenario):
         canvas.clip = plan.field
-        canvas.shade(scene.nodes[awake], scenario.radius_m * plan.scale, SENSED)
+        canvas.shade(nodes[awake], scenario.radius_m * plan.scale, SENSED)
     canvas.clip = widened(plan.field, round(9 * plan.unit) + 1)
-    _draw_nodes(canvas, plan, scene)
-    _draw_cloud(canvas, plan, scene)
-    _draw_cluster(canvas, plan, scene, awake, sees)
-    if scene.hands_over:
-        _draw_handover(canvas, plan, scene)
-    _draw_tracks(canvas, plan, scene)
+    _draw_nodes(canvas, plan, scenes[0])
+    for draw in (_draw_cloud, _draw_cluster, _draw_handover, _draw_tracks):
+        for scene in scenes:
+            draw(canvas, plan, scene)
     return canvas.image
 
 
@@ -132,8 +136,9 @@ def _draw_cloud(canvas: Canvas, plan: Plan, scene: Scene) -> None:
         canvas.cloud(left + x * plan.scale, bottom - y * plan.scale, weights, SKY)
 
 
-def _draw_cluster(canvas: Canvas, plan: Plan, scene: Scene, awake: np.ndarray, sees: np.ndarray) -> None:
+def _draw_cluster(canvas: Canvas, plan: Plan, scene: Scene) -> None:
     """Reports as lines to who receives them; rings about those that see; the awake, the head, the sink."""
+    awake, sees = np.flatnonzero(scene.view.member[0]), np.flatnonzero(scene.view.sees[0])
     unit, receiver = plan.unit, scene.scenario.radio.receiver
     head, positions, reports = scene.head, scene.nodes, scene.state.reports
     reported = reports.node[scene.row, : reports.count[scene.row]]
@@ -165,6 +170,8 @@ def _draw_cluster(canvas: Canvas, plan: Plan, scene: Scene, awake: np.ndarray, s
 
 def _draw_handover(canvas: Canvas, plan: Plan, scene: Scene) -> None:
     """An arrow from the last head to the present one."""
+    if not scene.hands_over:
+        return
     heads, last = scene.trail.head[scene.row], scene.periods
     old, new = heads[last - 1], heads[last]
     if old >= 0 and new >= 0:
@@ -195,22 +202,25 @@ def _root(cov) -> np.ndarray:
 # --- words --------------------------------------------------------------------------------------------------------
 
 
-def _write_head(canvas: Canvas, plan: Plan, scene: Scene) -> None:
-    """Above the field: scenario, period, what is going on; the numbers of the period and of the episode so far."""
-    state, scenario, trail, row, _ = scene
+def _write_head(canvas: Canvas, plan: Plan, scenes: list[Scene]) -> None:
+    """Above the field: scenario, period, what is going on; the numbers of the period and of the episode so far: of
+    several targets the mean error and the sum of the energies."""
+    state, scenario, trail, row, _ = scenes[0]
     font, edge, y = plan.font, _edge(plan), plan.font // 3
     x = canvas.text(edge, y, scenario.name, font, INK) + font if canvas.width >= WORDS_FROM else edge
     words = f"period {state.period[row]} of {scenario.periods}"
     if x + text_width(words, font) > canvas.width - edge:
         words = f"{state.period[row]}/{scenario.periods}"
     taken = canvas.text(x, y, words, font, DIM)
-    _write_chips(canvas, plan, _chips(scene), taken, y)
+    _write_chips(canvas, plan, _chips(scenes), taken, y)
     if canvas.width < WORDS_FROM:
         return
     y += plan.line
-    last, rms = scene.last, trail.rms_m(state, row)
-    error = [("error ", f"{figure(last['error_m'])} m"), ("   rms ", "-" if np.isnan(rms) else f"{figure(rms)} m")]
-    energy = [("energy ", joules(last["energy_mj"])), ("   so far ", joules(trail.energy_mj[row]))]
+    rows = slice(row, row + len(scenes))
+    rms = float(np.sqrt(np.mean([trail.rms_m(state, each.row) ** 2 for each in scenes])))
+    error_m, energy_mj = trail.last.error_m[rows].mean(), trail.last.energy_mj[rows].sum()
+    error = [("error ", f"{figure(error_m)} m"), ("   rms ", "-" if np.isnan(rms) else f"{figure(rms)} m")]
+    energy = [("energy ", joules(energy_mj)), ("   so far ", joules(trail.energy_mj[rows].sum()))]
     taken = _write(canvas, edge, y, error, font)
     for pairs in (energy, energy[:1]):
         left = canvas.width - edge - sum(text_width(label + value, font) for label, value in pairs)
@@ -231,15 +241,16 @@ def _edge(plan: Plan) -> int:
     return plan.font // 2 + 1
 
 
-def _chips(scene: Scene) -> list[tuple[str, Colour, Colour]]:
+def _chips(scenes: list[Scene]) -> list[tuple[str, Colour, Colour]]:
     """What is going on, each with its ground and ink."""
+    scene = scenes[0]
     nodes, alive = len(scene.nodes), scene.state.network.row["alive"][scene.row]
     chips = []
     if alive < nodes:
         chips.append((f"{alive} of {nodes} alive", PAPER, DIM) if alive else ("all dead", PAPER, VERMILION))
-    if scene.last["searched"]:
+    if any(each.last["searched"] for each in scenes):
         chips.append(("search", YELLOW, INK))
-    if scene.hands_over:
+    if any(each.hands_over for each in scenes):
         chips.append(("handover", PURPLE, INK))
     return chips
 

@@ -35,7 +35,7 @@ FINE, COARSE = 9999, 999  # steps across the room: of lines and of clouds
 
 @dataclass(frozen=True)
 class Episode:
-    """What one policy made of an episode; frames[k] is after k periods."""
+    """What one policy made of an episode; frames[k] is after k periods. Errors are means over the targets."""
 
     policy: str
     frames: list[dict[str, object]]
@@ -49,7 +49,7 @@ class Recording:
     """An episode, and what each of some policies made of it."""
 
     episodes: list[Episode]
-    common: dict[str, object]  # the room, the nodes, the track
+    common: dict[str, object]  # the room, the nodes, the tracks
 
 
 def record(policies: dict[str, Policy], scenario: Scenario, seed: int) -> Recording:
@@ -62,7 +62,8 @@ def record(policies: dict[str, Policy], scenario: Scenario, seed: int) -> Record
     """
     world = World(scenario, threads=1)
     played = [_play_episode(name, policy, world, seed) for name, policy in policies.items()]
-    return Recording(played, _common_data(world.reset([draws.key_of_seed(seed)]), scenario, seed))
+    keys = np.repeat([draws.key_of_seed(seed)], scenario.targets)
+    return Recording(played, _common_data(world.reset(keys), scenario, seed))
 
 
 def _play_episode(name: str, policy: Policy, world: World, seed: int) -> Episode:
@@ -74,9 +75,9 @@ def _play_episode(name: str, policy: Policy, world: World, seed: int) -> Episode
 
     for state, outcome in episodes(policy, world, [seed], begin=add_frame):
         add_frame(state, outcome)
-        squares.append(outcome.error_m[0] ** 2)
-        joules.append(outcome.energy_mj[0])
-        total -= scenario.counted_m(outcome.error_m[0]) + state.lam[0] * outcome.energy_mj[0]
+        squares.append(np.mean(outcome.error_m**2))
+        joules.append(outcome.energy_mj.sum())
+        total -= float(np.sum(scenario.counted_m(outcome.error_m) + state.lam * outcome.energy_mj))
     scored = squares[scenario.unscored :]
     return Episode(name, frames, float(np.sqrt(np.mean(scored))), float(np.mean(joules)), float(total))
 
@@ -101,7 +102,7 @@ def _common_data(state: State, scenario: Scenario, seed: int) -> dict[str, objec
         "hue": HUES,
         "legend": [(symbol, words) for symbol, words in legend(scenario) if symbol in HUES] + searches,
         "nodes": _grid_steps(state.network.positions[0], whole),
-        "track": _grid_steps(state.track[0, :, ::2], whole),
+        "tracks": [_grid_steps(track[:, ::2], whole) for track in state.track],
     }
 
 
@@ -111,29 +112,35 @@ def _grid_steps(points: ArrayLike, whole: float, steps: int = FINE) -> list[int]
 
 
 def _frame(state: State, outcome: Outcome, scenario: Scenario) -> dict[str, object]:
-    """A period of a batch of one."""
+    """A period of a batch of one field."""
+    charged = {int(node) for row in range(state.rows) for node in state.ledger.charged[row, : state.ledger.count[row]]}
+    return {
+        "targets": [_of_target(state, outcome, row, scenario) for row in range(state.rows)],
+        "left_j": [[node, float(f"{state.residual_j[0, node]:.7g}")] for node in sorted(charged)],
+        "error": round(float(outcome.error_m.mean()), 3),
+        "energy": round(float(outcome.energy_mj.sum()), 5),
+        "awake": int(outcome.members.sum()),
+        "search": bool(outcome.searched.any()),
+        "handover": bool(outcome.handover.any()),
+    }
+
+
+def _of_target(state: State, outcome: Outcome, row: int, scenario: Scenario) -> dict[str, object]:
+    """Its belief and its cluster."""
     whole = max(scenario.field.room_m)
-    network, belief, reports = state.network, state.belief.row[0], state.reports
-    x = state.belief.particles[0]
-    points = CLOUD * LONG // max(LONG, scenario.periods) or 1
+    network, belief, reports = state.network, state.belief.row[row], state.reports
+    x = state.belief.particles[row]
+    points = CLOUD * LONG // max(LONG, scenario.periods) // scenario.targets or 1
     shown = slice(0, None, max(1, -(-x.shape[1] // points)))
-    charged = state.ledger.charged[0, : state.ledger.count[0]]
-    frame = {
+    told = {
         "mean": _grid_steps(belief["mean"][::2], whole),
         "cov": [float(f"{belief['cov'][i, j]:.3g}") for i, j in ((0, 0), (0, 2), (2, 2))],
         "cloud": _grid_steps(np.clip(x[::2, shown].T, 0, whole), whole, COARSE),
-        "head": int(network.head[0]),
-        "members": network.members[0, : network.n_members[0]].tolist(),
-        "heard": reports.node[0, : reports.count[0]].tolist(),
-        "left_j": [[int(node), float(f"{state.residual_j[0, node]:.7g}")] for node in charged],
-        "error": round(float(outcome.error_m[0]), 3),
-        "energy": round(float(outcome.energy_mj[0]), 5),
-        "awake": int(outcome.members[0]),
-        "search": bool(outcome.searched[0]),
-        "handover": bool(outcome.handover[0]),
+        "head": int(network.head[row]),
+        "members": network.members[row, : network.n_members[row]].tolist(),
+        "heard": reports.node[row, : reports.count[row]].tolist(),
+        "handover": bool(outcome.handover[row]),
     }
-    return frame | (
-        {"detects": np.flatnonzero(View(state.knowledge).sees[0]).tolist()}
-        if scenario.measurement.reports_state
-        else {}
-    )
+    if scenario.measurement.reports_state:
+        told["detects"] = np.flatnonzero(View(state.knowledge).sees[row]).tolist()
+    return told

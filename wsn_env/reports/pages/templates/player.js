@@ -5,7 +5,7 @@ const episodes = data.episodes;
 const HUE = data.hue;
 const last = episodes[0].frames.length - 1;
 const nodes = pairs(data.nodes, data.unit_m);
-const track = pairs(data.track, data.unit_m);
+const tracks = data.tracks.map((track) => pairs(track, data.unit_m));
 const whole = Math.max(...data.room_m);
 const element = (id) => document.getElementById(id);
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -29,7 +29,9 @@ for (const episode of episodes) {
     for (const [node, battery] of frame.left_j) left[node] = battery;
     return Float64Array.from(left);
   });
-  episode.cluster = episode.frames.map((frame) => new Set(frame.head < 0 ? frame.members : [frame.head, ...frame.members]));
+  for (const frame of episode.frames)
+    for (const target of frame.targets)
+      target.cluster = new Set(target.head < 0 ? target.members : [target.head, ...target.members]);
   episode.least = Math.min(...left) / data.battery_j;
 }
 const least = Math.min(...episodes.map((episode) => episode.least)); // the emptiest battery of all is the palest
@@ -103,7 +105,7 @@ function ellipse(pen, at, [xx, xy, yy], scale) {
 
 function drawField(view) {
   const { episode } = view;
-  const frame = episode.frames[period], left = episode.left[period], cluster = episode.cluster[period];
+  const frame = episode.frames[period], left = episode.left[period];
   const [pen, width] = sized(view.canvas);
   const place = scaleOf(width), scale = (width - 24) / whole;
   const [x0, y0] = place([0, data.room_m[1]]);
@@ -120,7 +122,7 @@ function drawField(view) {
     pen.rect(x0, y0, data.room_m[0] * scale, data.room_m[1] * scale);
     pen.clip();
     pen.beginPath();
-    for (const node of cluster) {
+    for (const node of new Set(frame.targets.flatMap((target) => [...target.cluster]))) {
       const [x, y] = place(nodes[node]);
       pen.moveTo(x, y);
       pen.arc(x, y, data.radius_m * scale, 0, 2 * Math.PI);
@@ -130,10 +132,11 @@ function drawField(view) {
     pen.restore();
   }
   pen.fillStyle = HUE.cloud + "90";
-  for (const point of pairs(frame.cloud, data.coarse_m)) {
-    const [x, y] = place(point);
-    pen.fillRect(x - 1, y - 1, 2, 2);
-  }
+  for (const target of frame.targets)
+    for (const point of pairs(target.cloud, data.coarse_m)) {
+      const [x, y] = place(point);
+      pen.fillRect(x - 1, y - 1, 2, 2);
+    }
   const small = nodes.length > 400 ? 2 : 3;
   pen.lineWidth = 1;
   nodes.forEach((at, node) => {
@@ -147,31 +150,39 @@ function drawField(view) {
     line(pen, [[x - small, y - small], [x + small, y + small]], colour("--soft"), 1);
     line(pen, [[x - small, y + small], [x + small, y - small]], colour("--soft"), 1);
   });
-  const mean = [frame.mean[0] * data.unit_m, frame.mean[1] * data.unit_m];
-  const to = { head: nodes[frame.head], sink: [data.room_m[0] / 2, data.room_m[1] / 2], target: track[period] }[data.receiver];
-  if (to) for (const node of frame.heard) line(pen, [place(nodes[node]), place(to)], HUE.report, 1.5);
-  const leads = data.receiver === "head" && frame.head >= 0;
-  if (leads && frame.handover && episode.frames[period - 1].head >= 0)
-    line(pen, [place(nodes[episode.frames[period - 1].head]), place(nodes[frame.head])], HUE.handover, 3);
-  pen.lineWidth = 2;
-  for (const node of frame.detects ?? frame.heard) disc(pen, place(nodes[node]), leads && node === frame.head ? 10 : 8, null, HUE.report);
-  for (const node of cluster) disc(pen, place(nodes[node]), 5, HUE.member);
-  if (leads) disc(pen, place(nodes[frame.head]), 7, HUE.head);
-  if (data.receiver === "sink") { const [x, y] = place(to); pen.fillStyle = HUE.head; pen.fillRect(x - 6, y - 6, 12, 12); }
-  const since = Math.max(0, period - 30);
-  line(pen, track.slice(since, period + 1).map(place), HUE.target, 2.5);
-  line(pen, episode.frames.slice(since, period + 1).map((f) => place([f.mean[0] * data.unit_m, f.mean[1] * data.unit_m])),
-    colour("--ink"), 1, [3, 3]);
-  ellipse(pen, place(mean), frame.cov, scale);
-  pen.lineWidth = 3;
-  disc(pen, place(track[period]), 5.5, null, HUE.target);
-  const [x, y] = place(mean);
-  line(pen, [[x - 6, y], [x + 6, y]], colour("--ink"), 2);
-  line(pen, [[x, y - 6], [x, y + 6]], colour("--ink"), 2);
+  frame.targets.forEach((target, number) => drawCluster(pen, place, episode, target, number));
+  frame.targets.forEach((target, number) => drawTracks(pen, place, scale, episode, target, number));
   if (view.hovered >= 0) { pen.lineWidth = 2; disc(pen, place(nodes[view.hovered]), 9, null, colour("--ink")); }
   const spent = episode.frames.slice(0, period + 1).reduce((sum, f) => sum + f.energy, 0);
   view.numbers.textContent = `error ${frame.error.toFixed(2)} m · ${frame.awake} awake · ${joules(spent)} so far`;
   view.event.textContent = [frame.search && "search", frame.handover && "handover"].filter(Boolean).join(" · ");
+}
+
+function drawCluster(pen, place, episode, target, number) {
+  const to = { head: nodes[target.head], sink: [data.room_m[0] / 2, data.room_m[1] / 2], target: tracks[number][period] }[data.receiver];
+  if (to) for (const node of target.heard) line(pen, [place(nodes[node]), place(to)], HUE.report, 1.5);
+  const leads = data.receiver === "head" && target.head >= 0;
+  const before = period > 0 ? episode.frames[period - 1].targets[number].head : -1;
+  if (leads && target.handover && before >= 0)
+    line(pen, [place(nodes[before]), place(nodes[target.head])], HUE.handover, 3);
+  pen.lineWidth = 2;
+  for (const node of target.detects ?? target.heard) disc(pen, place(nodes[node]), leads && node === target.head ? 10 : 8, null, HUE.report);
+  for (const node of target.cluster) disc(pen, place(nodes[node]), 5, HUE.member);
+  if (leads) disc(pen, place(nodes[target.head]), 7, HUE.head);
+  if (data.receiver === "sink") { const [x, y] = place(to); pen.fillStyle = HUE.head; pen.fillRect(x - 6, y - 6, 12, 12); }
+}
+
+function drawTracks(pen, place, scale, episode, target, number) {
+  const since = Math.max(0, period - 30), track = tracks[number];
+  const at = (mean) => place([mean[0] * data.unit_m, mean[1] * data.unit_m]);
+  line(pen, track.slice(since, period + 1).map(place), HUE.target, 2.5);
+  line(pen, episode.frames.slice(since, period + 1).map((f) => at(f.targets[number].mean)), colour("--ink"), 1, [3, 3]);
+  const [x, y] = at(target.mean);
+  ellipse(pen, [x, y], target.cov, scale);
+  pen.lineWidth = 3;
+  disc(pen, place(track[period]), 5.5, null, HUE.target);
+  line(pen, [[x - 6, y], [x + 6, y]], colour("--ink"), 2);
+  line(pen, [[x, y - 6], [x, y + 6]], colour("--ink"), 2);
 }
 
 function hover(view, event) {
@@ -193,10 +204,11 @@ function hover(view, event) {
 function tell(view) {
   const best = view.hovered;
   if (best >= 0) {
-    const { frames, cluster, left } = view.episode;
-    const awake = (k) => cluster[k].has(best) || (frames[k].search && left[k - 1][best] > 0); // a search wakes all
+    const { frames, left } = view.episode;
+    const awake = (k) => frames[k].targets.some((target) => target.cluster.has(best))
+      || (frames[k].search && left[k - 1][best] > 0); // a search wakes all
     const periods = [...Array(period + 1).keys()].filter((k) => k > 0 && awake(k));
-    const heard = frames.slice(1, period + 1).filter((f) => f.heard.includes(best)).length;
+    const heard = frames.slice(1, period + 1).filter((f) => f.targets.some((target) => target.heard.includes(best))).length;
     const [x, y] = nodes[best];
     element("tip").textContent = `node ${best} at (${x.toFixed(1)}, ${y.toFixed(1)}) m\n`
       + `battery ${(100 * left[period][best] / data.battery_j).toFixed(3)} %\n`
