@@ -20,6 +20,8 @@ from tianshou.trainer import OnPolicyTrainerParams
 from tianshou.utils.net.common import Net
 from tianshou.utils.net.discrete import DiscreteActor, DiscreteCritic
 
+from wsn_env.learning.training_reward import TrainingReward
+
 
 class Native(BaseVectorEnv):
     """The native batch, all rows of which Tianshou's collector steps at once; it says itself which begin anew."""
@@ -55,7 +57,8 @@ def main(steps: int = 20_000, rows: int = 64, rollout: int = 16, seed: int = 0) 
     """Train, then play."""
     torch.manual_seed(seed)
     example = Example("Tianshou PPO")
-    envs = Native(gym.make_vec(ENV, rows, vectorization_mode="vector_entry_point", autoreset_mode="Disabled", **FIELD))
+    native = gym.make_vec(ENV, rows, vectorization_mode="vector_entry_point", autoreset_mode="Disabled", **FIELD)
+    envs = Native(TrainingReward(native))
     space, actions = example.held_out.single_observation_space, example.held_out.single_action_space
     layers = dict(state_shape=space.shape, hidden_sizes=[64, 64], activation=torch.nn.Tanh)
     actor = DiscreteActor(preprocess_net=Net(**layers), action_shape=actions.n, softmax_output=False)
