@@ -19,6 +19,7 @@ WEIGHT = np.array([1.0, FIELD["lam"]], np.float32) / (1.0 + FIELD["lam"])  # of 
 def main(steps: int = 20_000, seed: int = 0) -> None:
     """Train, then play."""
     torch.manual_seed(seed)
+    np.random.seed(seed)  # the replay buffer draws with it
     example = Example("MORL-Baselines Envelope")
     env = mo.make(ENV, **FIELD | {"reward": "vector"})
     env.action_space.seed(seed)

@@ -1,11 +1,11 @@
 # /// script
 # dependencies = ["wsn_env[train,ray]", "ray==2.60.0"]
 # ///
-"""Ray Tune looks for PPO's settings; the best trial's policy is scored on episodes that the search has not seen.
+"""Ray Tune looks for PPO's settings; the best are trained again and scored on episodes that the search has not seen.
 
 python examples/ray_tune_ppo.py --steps 20000 --trials 6
 
-Trials run in processes of Ray's, one at a time here; the best is trained again with the same seed, to the same policy.
+Trials run in processes of Ray's, one at a time here; the best is trained again with the same seed.
 """
 
 from tempfile import TemporaryDirectory

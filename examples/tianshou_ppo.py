@@ -56,6 +56,7 @@ class Native(BaseVectorEnv):
 def main(steps: int = 20_000, rows: int = 64, rollout: int = 16, seed: int = 0) -> None:
     """Train, then play."""
     torch.manual_seed(seed)
+    np.random.seed(seed)  # Tianshou shuffles its batches with it
     example = Example("Tianshou PPO")
     native = gym.make_vec(ENV, rows, vectorization_mode="vector_entry_point", autoreset_mode="Disabled", **FIELD)
     envs = Native(TrainingReward(native))
@@ -80,7 +81,7 @@ def main(steps: int = 20_000, rows: int = 64, rollout: int = 16, seed: int = 0) 
             max_epochs=1,
             epoch_num_steps=updates * rollout * rows,
             collection_step_num_env_steps=rollout * rows,
-            update_step_num_repetitions=10,
+            update_step_num_repetitions=4,
             batch_size=256,
             verbose=False,
             show_progress=False,
