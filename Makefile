@@ -51,7 +51,7 @@ test: $(READY)
 slow: $(READY)
 	$(RUN) -m pytest $(PARALLEL) -m slow
 
-# Every toolkit's example in a virtual environment of its own, half an hour, most of it pip's; renews docs/toolkits.md.
+# Every toolkit's example for three seeds, in a virtual environment of its own, 40 minutes, half of it pip's; renews docs/toolkits.md.
 examples: $(READY)
 	$(RUN) -m examples --torch-index "$(TORCH_INDEX)"
 

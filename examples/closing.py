@@ -32,7 +32,7 @@ class Example:
 
         Args:
             act: observations of all rows of `held_out` -> actions.
-            steps: periods trained.
+            steps: time steps trained.
         """
         seconds = time.perf_counter() - self._started
         self.held_out.action_space.seed(0)
@@ -40,7 +40,7 @@ class Example:
         trained = score(act, self.held_out)
         better = Summary.of(trained - random)
         print(
-            f"{self.name}: return {trained.mean():.1f} after {steps:,} periods in {seconds:.1f} s"
+            f"{self.name}: return {trained.mean():.1f} after {steps:,} time steps in {seconds:.1f} s"
             f" ({steps / seconds:,.0f} a second); random actions {random.mean():.1f},"
             f" better by {better.mean:.1f} [{better.low:.1f}, {better.high:.1f}] over {EPISODES} held-out episodes"
         )

@@ -5,7 +5,7 @@
 
     python examples/minari_cloning.py --steps 20000
 
-A quarter of the periods is recorded, the others are PPO's.
+A quarter of the time steps is recorded, the others are PPO's.
 """
 
 import os
@@ -17,34 +17,12 @@ import numpy as np
 import torch
 import tyro
 from closing import ENV, FIELD, Example
+from demonstrations import record
 from stable_baselines3 import PPO
 
 from wsn_env import score
-from wsn_env.agents.pre_dc import PreDC
-from wsn_env.envs.actions import GROUP
 from wsn_env.learning.sb3 import SB3VecEnv
 from wsn_env.learning.training_reward import TrainingReward
-
-
-def record(episodes: int, seed: int) -> minari.MinariDataset:
-    """Episodes of Pre-DC, in terms of the menu."""
-    env = minari.DataCollector(gym.make(ENV, **FIELD))
-    policy = PreDC(env.unwrapped.scenario)
-    for episode in range(episodes):
-        env.reset(seed=seed + episode)
-        ended = False
-        while not ended:
-            *_, ended, _ = env.step(entry_of(policy, env.unwrapped.view))
-    return env.create_dataset("wsn_env/pre-dc-v0", algorithm_name="Pre-DC")
-
-
-def entry_of(policy: PreDC, view) -> int:
-    """The menu's entry for what Pre-DC chooses: 0 keeps all, 1 + GROUP + n the best head and the n nearest to it."""
-    chosen = policy.act(view)
-    nodes = set(chosen.members[0][chosen.members[0] >= 0]) | {chosen.head[0]}
-    if chosen.head[0] == view.head[0] and nodes == set(np.flatnonzero(view.member[0])):
-        return 0
-    return 1 + GROUP + min(len(nodes) - 1, GROUP - 1)
 
 
 def clone(model: PPO, dataset: minari.MinariDataset, epochs: int = 60) -> None:
@@ -74,7 +52,7 @@ def main(steps: int = 20_000, rows: int = 64, seed: int = 0) -> None:
     with TemporaryDirectory() as folder:
         os.environ["MINARI_DATASETS_PATH"] = folder
         dataset = record(recorded, seed)
-        print(f"recorded: {dataset.total_episodes} episodes, {dataset.total_steps:,} periods")
+        print(f"recorded: {dataset.total_episodes} episodes, {dataset.total_steps:,} time steps")
         clone(model, dataset)
     print(f"cloned: return {score(act, example.held_out).mean():.1f}")
     model.learn(steps - dataset.total_steps)

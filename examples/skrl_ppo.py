@@ -27,6 +27,7 @@ def main(steps: int = 20_000, rows: int = 64, rollout: int = 16, seed: int = 0) 
     set_seed(seed)
     example = Example("skrl PPO")
     native = gym.make_vec(ENV, rows, vectorization_mode="vector_entry_point", autoreset_mode="SameStep", **FIELD)
+    native.reset(seed=seed)  # skrl's own reset has no seed: it goes on with these generators
     envs = wrap_env(TrainingReward(native))
     spaces = dict(observation_space=envs.observation_space, action_space=envs.action_space, device="cpu")
     models = {

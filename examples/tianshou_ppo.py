@@ -20,6 +20,8 @@ from tianshou.trainer import OnPolicyTrainerParams
 from tianshou.utils.net.common import Net
 from tianshou.utils.net.discrete import DiscreteActor, DiscreteCritic
 
+from wsn_env.learning.training_reward import TrainingReward
+
 
 class Native(BaseVectorEnv):
     """The native batch, all rows of which Tianshou's collector steps at once; it says itself which begin anew."""
@@ -54,8 +56,10 @@ class Native(BaseVectorEnv):
 def main(steps: int = 20_000, rows: int = 64, rollout: int = 16, seed: int = 0) -> None:
     """Train, then play."""
     torch.manual_seed(seed)
+    np.random.seed(seed)  # Tianshou shuffles its batches with it
     example = Example("Tianshou PPO")
-    envs = Native(gym.make_vec(ENV, rows, vectorization_mode="vector_entry_point", autoreset_mode="Disabled", **FIELD))
+    native = gym.make_vec(ENV, rows, vectorization_mode="vector_entry_point", autoreset_mode="Disabled", **FIELD)
+    envs = Native(TrainingReward(native))
     space, actions = example.held_out.single_observation_space, example.held_out.single_action_space
     layers = dict(state_shape=space.shape, hidden_sizes=[64, 64], activation=torch.nn.Tanh)
     actor = DiscreteActor(preprocess_net=Net(**layers), action_shape=actions.n, softmax_output=False)
@@ -77,7 +81,7 @@ def main(steps: int = 20_000, rows: int = 64, rollout: int = 16, seed: int = 0) 
             max_epochs=1,
             epoch_num_steps=updates * rollout * rows,
             collection_step_num_env_steps=rollout * rows,
-            update_step_num_repetitions=10,
+            update_step_num_repetitions=4,
             batch_size=256,
             verbose=False,
             show_progress=False,
