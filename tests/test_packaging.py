@@ -21,7 +21,7 @@ import wsn_env
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
-FOR_USERS = "train plot front render ray".split()  # extras
+FOR_USERS = "train plot front render ray multi".split()  # extras
 COMPANIONS = {"pyparsing"}  # in constraints-lowest.txt for the sake of another
 LEFT_OUT = (".*", "build", "dist", "out", "runs", "results", "_generated", "__pycache__", "*.egg-info")
 BUILD = "import sys; from setuptools import build_meta; getattr(build_meta, 'build_' + sys.argv[1])(sys.argv[2])"
