@@ -208,7 +208,7 @@ def _write_head(canvas: Canvas, plan: Plan, scenes: list[Scene]) -> None:
     state, scenario, trail, row, _ = scenes[0]
     font, edge, y = plan.font, _edge(plan), plan.font // 3
     x = canvas.text(edge, y, scenario.name, font, INK) + font if canvas.width >= WORDS_FROM else edge
-    words = f"period {state.period[row]} of {scenario.periods}"
+    words = f"step {state.period[row]} of {scenario.periods}"
     if x + text_width(words, font) > canvas.width - edge:
         words = f"{state.period[row]}/{scenario.periods}"
     taken = canvas.text(x, y, words, font, DIM)
