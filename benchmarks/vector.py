@@ -97,7 +97,7 @@ def race(particles: int, rows: int, options: Options) -> Times:
 def episode(envs: gym.vector.VectorEnv) -> Callable[[], None]:
     """A call that steps all rows through an episode and the reset after it."""
     envs.reset(seed=0)
-    actions = np.full(envs.num_envs, MENU_ENTRY)
+    actions = np.full(envs.action_space.shape, MENU_ENTRY)
 
     def call():
         truncated = np.zeros(envs.num_envs, bool)

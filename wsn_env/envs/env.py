@@ -7,7 +7,6 @@ from typing import Any, Unpack
 
 import gymnasium as gym
 import numpy as np
-from gymnasium.envs.registration import EnvSpec
 
 from wsn_env.compiled import draws
 from wsn_env.envs.actions import ActionName
@@ -17,7 +16,7 @@ from wsn_env.envs.observations import Follower, ObservationName
 from wsn_env.envs.one_thread import Busy, one_thread
 from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera, RenderMode
 from wsn_env.envs.rewards import RewardName
-from wsn_env.envs.spec import told_spec
+from wsn_env.envs.spec import TellsHorizon
 from wsn_env.models.arguments import checked_but
 from wsn_env.models.measurement.base import Order
 from wsn_env.models.quantity import whole_number
@@ -30,7 +29,7 @@ from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World, choice_of
 
 
-class ClusterEnv(gym.Env):
+class ClusterEnv(TellsHorizon, gym.Env):
     """Choose a cluster each period; the reward is minus (error + lam * energy).
 
     Args:
@@ -52,7 +51,6 @@ class ClusterEnv(gym.Env):
     """
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": FPS}
-    _spec: EnvSpec | None = None
 
     @checked_but("candidates", "frame_px")
     def __init__(  # noqa: PLR0913
@@ -207,13 +205,9 @@ class ClusterEnv(gym.Env):
             self._camera.close()
 
     @property
-    def spec(self) -> EnvSpec | None:
-        """How `gym.make` made it, with the horizon as `max_episode_steps`."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = told_spec(spec, self.scenario.periods)
+    def horizon(self) -> int:
+        """Time steps of an episode."""
+        return self.scenario.periods
 
     def _observe(self, info: dict[str, Any]) -> Any:
         self._view, arrays = self._follower()

@@ -7,12 +7,11 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
-from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from wsn_env.envs.rendering.camera import FPS, RENDER_MODES
-from wsn_env.envs.spec import told_spec
+from wsn_env.envs.spec import TellsHorizon
 from wsn_env.envs.vector_env import ClusterVectorEnv, row_seeds
 from wsn_env.models.quantity import whole_number
 from wsn_env.models.state import Cluster
@@ -34,7 +33,7 @@ class TargetRows(ClusterVectorEnv):
         return np.repeat(super()._draw_keys(rows & first)[::targets], targets)
 
 
-class MultiVectorEnv(gym.vector.VectorEnv):
+class MultiVectorEnv(TellsHorizon, gym.vector.VectorEnv):
     """B fields with M targets each, which share nodes and batteries. Each target has its track, its belief and its
     cluster; a node in two clusters is awake once, reports to both heads and pays for both reports.
 
@@ -55,7 +54,7 @@ class MultiVectorEnv(gym.vector.VectorEnv):
         "render_fps": FPS,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
-    _spec: EnvSpec | None = None
+    horizon_as_argument = True
 
     def __init__(
         self,
@@ -132,13 +131,9 @@ class MultiVectorEnv(gym.vector.VectorEnv):
         return self.rows.lam[:: self.targets]
 
     @property
-    def spec(self) -> EnvSpec | None:
-        """How `gym.make_vec` made it, with the horizon as `max_episode_steps`."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = told_spec(spec, self.scenario.periods)
+    def horizon(self) -> int:
+        """Time steps of an episode."""
+        return self.rows.horizon
 
     def action_masks(self) -> np.ndarray:
         """(B, M, n) bool: which actions of each target differ from others now."""
@@ -193,7 +188,7 @@ class MultiVectorEnv(gym.vector.VectorEnv):
         return final
 
 
-class MultiEnv(gym.Env):
+class MultiEnv(TellsHorizon, gym.Env):
     """One field with several targets: a MultiVectorEnv of one, without its first axis.
 
     Args:
@@ -201,7 +196,6 @@ class MultiEnv(gym.Env):
     """
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": FPS}
-    _spec: EnvSpec | None = None
 
     def __init__(self, scenario: str | Scenario = "PreDC-v0", targets: int | None = None, **more: Any) -> None:
         self.fields: MultiVectorEnv = MultiVectorEnv(1, scenario, targets, **more, autoreset_mode="Disabled", threads=1)
@@ -252,13 +246,9 @@ class MultiEnv(gym.Env):
         self.fields.close()
 
     @property
-    def spec(self) -> EnvSpec | None:
-        """How `gym.make` made it, with the horizon as `max_episode_steps`."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = told_spec(spec, self.scenario.periods)
+    def horizon(self) -> int:
+        """Time steps of an episode."""
+        return self.fields.horizon
 
     def _own(self, info: dict[str, Any]) -> dict[str, Any]:
         """Of the one field, without the masks of a batch."""

@@ -15,6 +15,29 @@ from wsn_env.models.quantity import Section
 from wsn_env.scenario.scenario import Scenario, section_as_dict
 
 
+class TellsHorizon:
+    """An environment whose spec, as Gymnasium sets it, tells its horizon."""
+
+    _spec: EnvSpec | None = None
+    horizon_as_argument = False  # of a batch, which `make_vec` gives the horizon that a spec tells
+
+    @property
+    def horizon(self) -> int:
+        """Time steps of an episode."""
+        raise NotImplementedError
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How `gym.make` or `gym.make_vec` made it, with the horizon as `max_episode_steps`."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = told_spec(spec, self.horizon)
+        if self._spec is not None and self.horizon_as_argument:
+            self._spec.kwargs.setdefault("max_episode_steps", self.horizon)
+
+
 def told_spec(spec: EnvSpec | None, horizon: int) -> EnvSpec | None:
     """As `gym.make` has set it, with `max_episode_steps`, so that tools which look for the horizon there find it.
 

@@ -7,7 +7,6 @@ from typing import Any, Literal, Unpack, cast
 
 import gymnasium as gym
 import numpy as np
-from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
@@ -20,7 +19,7 @@ from wsn_env.envs.observations import Follower, ObservationName
 from wsn_env.envs.one_thread import Busy, one_thread
 from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera, RenderMode
 from wsn_env.envs.rewards import RewardName
-from wsn_env.envs.spec import told_spec
+from wsn_env.envs.spec import TellsHorizon
 from wsn_env.models.arguments import checked_but
 from wsn_env.models.measurement.base import Order
 from wsn_env.models.quantity import whole_number
@@ -33,7 +32,7 @@ from wsn_env.simulation.view import View
 from wsn_env.simulation.world import World, choice_of
 
 
-class ClusterVectorEnv(gym.vector.VectorEnv):
+class ClusterVectorEnv(TellsHorizon, gym.vector.VectorEnv):
     """B fields at once. Row i is bit-identical to a ClusterEnv with seed + i, in all three autoreset modes.
 
     Args:
@@ -52,7 +51,7 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
     }
 
     takes_several_targets = False  # a row for each
-    _spec: EnvSpec | None = None
+    horizon_as_argument = True
 
     @checked_but("num_envs", "candidates", "frame_px", "threads", "max_episode_steps")
     def __init__(  # noqa: PLR0913
@@ -268,15 +267,9 @@ class ClusterVectorEnv(gym.vector.VectorEnv):
         return tuple(self._generators)
 
     @property
-    def spec(self) -> EnvSpec | None:
-        """How `gym.make_vec` made it, with the horizon as `max_episode_steps`."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = told_spec(spec, self._horizon)
-        if self._spec is not None:  # as make_vec gives it for a spec that tells a horizon
-            self._spec.kwargs.setdefault("max_episode_steps", self._horizon)
+    def horizon(self) -> int:
+        """Time steps of an episode."""
+        return self._horizon
 
     @property
     def lam(self) -> np.ndarray:
