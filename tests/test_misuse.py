@@ -19,6 +19,8 @@ from wsn_env import (
     Cluster,
     ClusterEnv,
     ClusterVectorEnv,
+    MultiEnv,
+    MultiVectorEnv,
     Scenario,
     View,
     World,
@@ -152,6 +154,7 @@ def doors(where, dataset):
     """The public callables."""
     env, envs = ClusterEnv(TINY), ClusterVectorEnv(2, TINY, threads=1)
     env.reset(seed=1), envs.reset(seed=1)
+    several, fields = MultiEnv(TINY, targets=2), MultiVectorEnv(1, TINY, targets=2, threads=1)
     world = World(TINY, threads=1)
     state = world.reset([1, 2])
     policy, view = make_policy("nearest1", TINY), View.of(state)
@@ -169,6 +172,13 @@ def doors(where, dataset):
         "ClusterEnv.reset": door(env.reset),
         "ClusterVectorEnv": door(ClusterVectorEnv, scenario=TINY, threads=1),
         "ClusterVectorEnv.reset": door(envs.reset),
+        "MultiEnv": door(MultiEnv, scenario=TINY),
+        "MultiEnv.reset": door(several.reset),
+        "MultiEnv.step": door(lambda action: (several.reset(seed=1), several.step(action)), action=[1, 2]),
+        "MultiVectorEnv": door(MultiVectorEnv, scenario=TINY, threads=1),
+        "MultiVectorEnv.reset": door(fields.reset),
+        "MultiVectorEnv.step": door(lambda actions: (fields.reset(seed=1), fields.step(actions)), actions=[[1, 2]]),
+        "parallel_env": door(wsn_env.parallel_env, name=TINY),
         "gym.make": (
             partial(gym.make, "wsn_env/PreDC-v0"),
             [name for name in inspect.signature(ClusterEnv).parameters if name not in ("render_mode", "overrides")],

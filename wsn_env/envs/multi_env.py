@@ -10,9 +10,10 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
+from wsn_env.envs.interface import check_options
 from wsn_env.envs.rendering.camera import FPS, RENDER_MODES
 from wsn_env.envs.spec import TellsHorizon
-from wsn_env.envs.vector_env import ClusterVectorEnv, row_seeds
+from wsn_env.envs.vector_env import ClusterVectorEnv, check_reset_mask, row_seeds
 from wsn_env.models.quantity import whole_number
 from wsn_env.models.state import Cluster
 from wsn_env.scenario import Scenario
@@ -85,9 +86,12 @@ class MultiVectorEnv(TellsHorizon, gym.vector.VectorEnv):
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """New episodes; seeds and options["reset_mask"] are of fields, as ClusterVectorEnv.reset has them of rows."""
+        check_options(options)
         seeds: Any = np.repeat(np.array(row_seeds(seed, self.num_envs), object), self.targets).tolist()
-        if options is not None and options.get("reset_mask") is not None:
-            options = {**options, "reset_mask": np.repeat(np.asarray(options["reset_mask"]), self.targets)}
+        mask = (options or {}).get("reset_mask")
+        if mask is not None:
+            check_reset_mask(mask, self.num_envs)
+            options = {**(options or {}), "reset_mask": np.repeat(mask, self.targets)}
         observation, info = self.rows.reset(seed=None if seed is None else seeds, options=options)
         return self._fold(observation), self._fold_info(info)
 
@@ -207,8 +211,10 @@ class MultiEnv(TellsHorizon, gym.Env):
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """A new episode: seed fixes field, tracks and every draw."""
+        check_options(options)
+        seed = None if seed is None else whole_number("seed", seed, 0)
         super().reset(seed=seed)
-        observation, info = self.fields.reset(seed=seed, options=options)
+        observation, info = self.fields.reset(seed=seed)
         self._ended = False
         return _only(observation), self._own(info)
 

@@ -138,12 +138,7 @@ class ClusterVectorEnv(TellsHorizon, gym.vector.VectorEnv):
         mask = (options or {}).get("reset_mask")
         if mask is None:
             return np.ones(self.num_envs, dtype=bool)
-        good = isinstance(mask, np.ndarray) and mask.shape == (self.num_envs,) and mask.dtype == bool and mask.any()
-        if not good or (self._state is None and not mask.all()):
-            raise ValueError(
-                f"options['reset_mask'] = {mask!r}: must be a NumPy bool array of shape ({self.num_envs},) with at"
-                " least one True, after a reset of all rows"
-            )
+        check_reset_mask(mask, self.num_envs, self._state is None)
         return mask
 
     def _restart(self, rows: np.ndarray) -> dict[str, np.ndarray]:
@@ -341,6 +336,16 @@ class ClusterVectorEnv(TellsHorizon, gym.vector.VectorEnv):
         self._view, observation = self._follower(rows)
         self._shown = None
         return observation
+
+
+def check_reset_mask(mask: Any, rows: int, first: bool = False) -> None:
+    """Raise ValueError unless it marks some of so many rows; at the first reset all."""
+    good = isinstance(mask, np.ndarray) and mask.shape == (rows,) and mask.dtype == bool and mask.any()
+    if not good or (first and not mask.all()):
+        raise ValueError(
+            f"options['reset_mask'] = {mask!r}: must be a NumPy bool array of shape ({rows},) with at least one True,"
+            " after a reset of all rows"
+        )
 
 
 def row_seeds(seed: Any, rows: int) -> list[int | None]:
