@@ -16,7 +16,7 @@ from wsn_env.evaluation.front import (
 )
 from wsn_env.reports.front_plots import draw_fronts, front_title
 from wsn_env.reports.pictures import write_picture
-from wsn_env.reports.tables import format_interval, wide_console
+from wsn_env.reports.tables import format_interval, narrow_table, wide_console
 
 FRONT_FILES = ("front.csv", "front.json", "front.png")
 
@@ -35,11 +35,7 @@ def save_and_print_fronts(evaluation: Evaluation, out: Path | None = None) -> No
 
 def print_front(evaluation: Evaluation, found: Fronts) -> None:
     """A row for every point."""
-    from rich.table import Table
-
-    table = Table(title=front_title(evaluation), caption="means with 95 % bootstrap intervals")
-    for column in ("policy", "lam m/mJ", "mean error m", "energy mJ/step"):
-        table.add_column(column, justify="left" if column == "policy" else "right")
+    table = narrow_table(front_title(evaluation), ["policy", "lam m/mJ", "mean error m", "energy mJ/step"])
     fine, small = map(_digits, reference_point(evaluation.scenario))
     for points in found.values():
         for point in points:
@@ -47,21 +43,16 @@ def print_front(evaluation: Evaluation, found: Fronts) -> None:
             figures = format_interval(point.error, fine), format_interval(point.energy, small)
             table.add_row(point.policy, lam, *figures)
         table.add_section()
-    wide_console().print(table)
+    console = wide_console()
+    console.print(table)
+    console.print("means with 95 % bootstrap intervals", style="dim")
 
 
 def print_hypervolumes(volumes: list[Volume], reference: tuple[float, float]) -> None:
     """A row for every front: its hypervolume, its part of the reference point's box, the paired difference."""
-    from rich.table import Table
-
     error, energy = reference
-    first = volumes[0].front
-    table = Table(
-        title="Hypervolume",
-        caption=f"up to the reference point of {error:g} m and {energy:g} mJ; 95 % bootstrap intervals, paired",
-    )
-    for column in ("front", "hypervolume m mJ", "of the box", f"difference to {first}"):
-        table.add_column(column, justify="left" if column == "front" else "right")
+    title = f"Hypervolume up to {error:g} m and {energy:g} mJ"
+    table = narrow_table(title, ["front", "m mJ", "of all", f"difference to {volumes[0].front}"])
     digits = _digits(error * energy)
     for volume in volumes:
         difference = "" if volume.difference is None else format_interval(volume.difference, digits, "+")

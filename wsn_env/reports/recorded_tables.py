@@ -10,7 +10,7 @@ from wsn_env.evaluation.files import replacing
 from wsn_env.reports.markdown import escape_markdown, markdown_table
 from wsn_env.reports.pictures import can_draw, write_picture
 from wsn_env.reports.recorded_plots import draw_recorded
-from wsn_env.reports.tables import wide_console
+from wsn_env.reports.tables import narrow_table, wide_console
 
 REFERENCE = "all"
 
@@ -57,19 +57,17 @@ def compare_at_equal_energy(evaluation: RecordedEvaluation, lam: float) -> list[
 
 
 def print_recorded_tables(evaluation: RecordedEvaluation) -> None:
-    """A table for each lam."""
-    from rich.table import Table
-
+    """A table for each lam that fits 80 columns; tracks.md has each track's error, too."""
     console = wide_console()
     for lam in evaluation.first.lams:
         header, rows = recorded_rows(evaluation, lam)
         title = f"{evaluation.first.scenario.name}, {evaluation.description}, lam = {lam:g} m/mJ"
-        drawn = Table(title=title, caption="\n".join(compare_at_equal_energy(evaluation, lam)))
-        for name in header:
-            drawn.add_column(name, justify="left" if name == "policy" else "right")
+        shown = len(header) - len(evaluation.by_track)
+        drawn = narrow_table(title, header[:shown])
         for row in rows:
-            drawn.add_row(*row)
+            drawn.add_row(*row[:shown])
         console.print(drawn)
+        console.print("\n".join(compare_at_equal_energy(evaluation, lam)), style="dim")
 
 
 def recorded_markdown(evaluation: RecordedEvaluation) -> str:

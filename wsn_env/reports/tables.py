@@ -127,18 +127,24 @@ def print_tables(evaluation: Evaluation, reference: str | None = None, most: int
     console.print(f"{'/ref: ' if has else ''}{describe_reference(evaluation)}", style="dim")
 
 
-def _terminal_table(evaluation: Evaluation, lam: float, reference: str, shown: list[str]) -> Any:
+def narrow_table(title: str, columns: list[str]) -> Any:
+    """For the terminal: no frame, the first column to the left."""
     from rich import box
     from rich.table import Table
 
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", padding=(0, 1, 0, 0), pad_edge=False)
+    for number, name in enumerate(columns):
+        table.add_column(name, justify="right" if number else "left", overflow="fold")
+    return table
+
+
+def _terminal_table(evaluation: Evaluation, lam: float, reference: str, shown: list[str]) -> Any:
     cap, dying = evaluation.scenario.error_cap_m, nodes_die(evaluation)
     title = f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes"
-    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", padding=(0, 1, 0, 0), pad_edge=False)
     error = ["RMS m"] if cap is None else ["capped m"]
     error += ["/ref"] if has_reference(evaluation.scenario) else []
     last = "functional" if dying else "lost"
-    for name in ("policy", "return", f"to {reference}", *error, "mJ", "awake", last):
-        table.add_column(name, justify="left" if name == "policy" else "right", overflow="fold")
+    table = narrow_table(title, ["policy", "return", f"to {reference}", *error, "mJ", "awake", last])
     for policy in shown:
         s = evaluation.summary(policy, lam)
         difference = evaluation.difference(policy, reference, lam)
