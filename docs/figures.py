@@ -47,7 +47,7 @@ MAKERS: dict[str, list[list[str]]] = {  # arguments of Python, one command after
     "leaderboard": [["-m", "studies.leaderboard", "--out", "{out}"]],
     "particles": [["-m", "studies.particles", "--out", "{out}"]],
     "lifetime": [["-m", "studies.lifetime", "--out", "{out}"]],
-    "several_targets": [["-m", "studies.targets", "--out", "{out}"]],
+    "multi": [["-m", "studies.targets", "--out", "{out}"]],
     "worlds": [["-m", "studies.worlds", "--scenario", name, *RECORDED, "--out", "{out}"] for name in SHIPPED],
     "reliability": [["-m", "studies.reliability", "--out", "{out}"]],
     "planning": [

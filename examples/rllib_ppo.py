@@ -6,7 +6,7 @@
     python examples/rllib_ppo.py --steps 20000
     python examples/rllib_ppo.py --runners 2 --seed None
 
-`NativeRunner` takes the batch array by array. RLlib's own runner works with it, too, and is half as fast.
+`NativeRunner` takes the batch array by array. RLlib's own runner works with it, too, and is slower.
 """
 
 import torch

@@ -172,4 +172,4 @@ def test_particles(tmp_path, capsys):
 def test_several_targets_in_short(tmp_path, capsys):
     assert targets.main(["--episodes", "30", "--out", str(tmp_path)]) == 0
     assert (tmp_path / "return.md").read_text() in capsys.readouterr().out
-    check_tables("targets.md", "several_targets", tmp_path, share=0.1)
+    check_tables("targets.md", "multi", tmp_path, share=0.1)

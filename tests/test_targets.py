@@ -77,7 +77,10 @@ def test_nodes_and_batteries_are_shared(targets, settings):
             shared = getattr(state.network, name).reshape(4, targets, -1)
             assert (shared == shared[:, :1]).all()
         assert (state.residual_j.reshape(4, targets, -1) == state.residual_j[::targets, None]).all()
-        assert (state.living == (state.residual_j > 0).sum(axis=1)).all()
+        assert (state.living == (state.residual_j > 0).sum(axis=1)).all() and (outcome.alive == state.living).all()
+        for name in ("first_death", "half_dead"):
+            died = state.life[name].reshape(-1, targets)
+            assert (died == died[:, :1]).all()
         view = View(state.knowledge)
         assert (view.network.row["alive"] == view.alive.sum(axis=1)).all()
         assert view.network.row["left_j"] == pytest.approx(view.battery.sum(axis=1), rel=1e-6, abs=1e-9)
@@ -96,6 +99,34 @@ def test_a_node_in_two_clusters_senses_once_and_reports_to_both():
     sensing_mj = 1e3 * outcome.row["energy_j"][:, 0]
     assert sensing_mj == pytest.approx([0.3, 0.1])  # 1 and 2 are awake already
     assert (outcome.row["members"] == 3).all()
+
+
+def test_it_senses_once_also_where_a_head_dies():
+    """The first target's cluster ends with its head; compiled and other filters follow one order."""
+    nodes, ended = np.array([[0, 1, 2], [3, 1, 2]], np.int32), []
+    for battery_j in np.linspace(1e-4, 4e-4, 16):
+        sensing_j = []
+        for tracker in ("particle", "ekf"):
+            settings = SMALL | dict(search=False, sensing_nj=1e5, tracker=tracker)
+            world = World(Scenario.named("PreDC-v0", targets=2, **settings))
+            state = world.reset(np.repeat([draws.key_of_seed(0)], 2))
+            state.residual_j[:, 0] = state.network.battery[:, 0] = battery_j
+            state, outcome = world.step(state, Cluster(nodes[:, 0].astype(np.int64), nodes))
+            sensing_j.append(outcome.row["energy_j"][:, 0].tolist())
+            ended.append(state.network.row["head"][0] < 0)
+            assert outcome.row["energy_j"][:, 0].sum() <= 4e-4 + 1e-12
+        assert sensing_j[0] == sensing_j[1]
+    assert any(ended) and not all(ended)
+
+
+def test_a_search_wakes_who_is_asleep_for_all_targets():
+    """Two searches at once: two calls, but each node pays once for being awake."""
+    settings = SMALL | dict(start="search", nodes=50, sensing_nj=1e5)
+    world = World(Scenario.named("PreDC-v0", targets=2, **settings))
+    state = world.allocate(2)
+    _, outcome = world.restart(state, [True] * 2, np.repeat([draws.key_of_seed(0)], 2), donate=True)
+    search_mj = 1e3 * outcome.row["energy_j"][:, -1]
+    assert outcome.row["searched"].all() and search_mj[0] - search_mj[1] == pytest.approx(50 * 0.1, rel=0.02)
 
 
 @pytest.mark.parametrize("policy", ["nearest2", "greedy", "adaptive", "pre_dc", "ppo"])
@@ -163,6 +194,42 @@ def test_spaces_have_an_axis_of_targets():
     assert envs.unwrapped.action_masks().shape == (5, 2, 28)
 
 
+def test_targets_are_those_of_a_scenario_unless_told():
+    five = Scenario.named("PreDC-v0", targets=5)
+    assert gym.make("wsn_env/Multi-v0", scenario=five).unwrapped.targets == 5
+    assert gym.make("wsn_env/Multi-v0", scenario=five, targets=2).unwrapped.targets == 2
+    assert MultiEnv(Scenario.named("PreDC-v0")).targets == 1 and MultiEnv("Rssi-v0").targets == 3
+
+
+def test_generators_and_seeds_are_those_that_draw():
+    env = MultiEnv(targets=2, **SMALL)
+    env.reset()
+    again = MultiEnv(targets=2, **SMALL)
+    again.reset(seed=env.np_random_seed)
+    assert (env.view.positions == again.view.positions).all() and env.np_random is env.fields.np_random[0]
+    for each in (env, again):
+        each.np_random = np.random.Generator(np.random.PCG64(3))
+        each.reset()
+    assert (env.view.positions == again.view.positions).all()
+    envs = MultiVectorEnv(3, targets=2, **SMALL)
+    seen = envs.reset(seed=5)[0]
+    assert (envs.rows.reset(seed=5)[0].reshape(seen.shape) == seen).all() and envs.np_random_seed == (5, 6, 7)
+
+
+def test_fields_are_reset_as_a_whole():
+    envs = MultiVectorEnv(3, targets=2, autoreset_mode="Disabled", **SMALL)
+    envs.reset(seed=0)
+    before = envs.view.positions
+    envs.reset(options={"reset_mask": np.array([False, True, False])})
+    changed = (envs.view.positions != before).any(axis=(1, 2))
+    assert changed.tolist() == [False, False, True, True, False, False]
+    for mask in (np.array([True, False]), [True, False, False], np.array([[True], [False], [False]])):
+        with pytest.raises(ValueError, match=r"NumPy bool array of shape \(3,\)"):
+            envs.reset(options={"reset_mask": mask})
+    with pytest.raises(ValueError, match="must mark all 2 rows of a field, or none"):
+        envs.rows.reset(options={"reset_mask": np.array([True] + [False] * 5)})
+
+
 def test_single_and_batch_are_the_same_fields():
     envs = MultiVectorEnv(3, targets=2, autoreset_mode="Disabled", **SMALL)
     seen = envs.reset(seed=11)[0]
@@ -181,9 +248,9 @@ def test_single_and_batch_are_the_same_fields():
 
 
 def test_what_is_made_for_one_target_says_so():
-    with pytest.raises(ScenarioError, match="targets = 2: must be 1 here; MultiEnv"):
+    with pytest.raises(ScenarioError, match="targets = 2: must be 1 for ClusterEnv; several"):
         gym.make("wsn_env/PreDC-v0", targets=2)
-    with pytest.raises(ScenarioError, match="targets = 2: must be 1 here; MultiEnv"):
+    with pytest.raises(ScenarioError, match="targets = 2: must be 1 for ClusterVectorEnv; several"):
         ClusterVectorEnv(4, targets=2)
     for settings in (
         dict(scenario="Binary-v0"),
@@ -201,6 +268,18 @@ def test_what_is_made_for_one_target_says_so():
         envs = MultiVectorEnv(2, targets=2, **SMALL)
         envs.reset(seed=0)
         envs.step(np.zeros((2, 3), int))
+    with pytest.raises(TypeError, match="MultiEnv.. got an unexpected keyword argument 'threads'"):
+        MultiEnv(threads=1)
+    envs = MultiVectorEnv(2, targets=2, autoreset_mode="SameStep", **SMALL)
+    for wrong, words in (
+        (lambda: wsn_env.score(lambda seen: seen, envs), "MultiVectorEnv: must be"),
+        (lambda: wsn_env.score(lambda seen: seen, envs.rows), "must be 1 for score"),
+        (lambda: wsn_env.error_bound("nearest2", Scenario.named("PreDC-v0", targets=2)), "must be 1 for a bound"),
+        (lambda: wsn_env.plot_episode("nearest2", Scenario.named("PreDC-v0", targets=2)), "must be 1 for plot_episode"),
+        (lambda: wsn_env.register("Mine-v0", targets=2), "must be 1 for ClusterEnv"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            wrong()
     world = World(Scenario.named("PreDC-v0", targets=3, **SMALL))
     with pytest.raises(ValueError, match="multiple of targets = 3"):
         world.allocate(4)
@@ -263,6 +342,11 @@ def test_an_agent_for_each_candidate_wakes_by_offering():
     assert view.head.tolist() == [nodes[0, 4], nodes[1, 0]]
     assert np.flatnonzero(view.member[0]).tolist() == sorted([nodes[0, 1], nodes[0, 4]])
     assert infos["target_0/node_0"]["members"] == 2 and infos["target_1/node_7"]["members"] == 1
+    for wrong in (-1, 4, 1.7):
+        with pytest.raises(ValueError, match="must be 0, 1, 2 or 3"):
+            env.step(dict.fromkeys(env.agents, 0) | {"target_0/node_0": wrong})
+    with pytest.raises(ValueError, match="target_1/node_11 must have one"):
+        env.step({agent: 0 for agent in env.agents[:-1]})
     with pytest.raises(ValueError, match="agents = 'nodes': allowed are 'targets' and 'candidates'"):
         wsn_env.parallel_env(agents="nodes")
     with pytest.raises(ValueError, match="action = 'menu': must be 'scores' with agents = 'candidates'"):

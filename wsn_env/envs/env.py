@@ -11,7 +11,7 @@ import numpy as np
 from wsn_env.compiled import draws
 from wsn_env.envs.actions import ActionName
 from wsn_env.envs.info import outcome_by_name
-from wsn_env.envs.interface import Interface, Settings, check_one_target, check_options, scenario_of
+from wsn_env.envs.interface import Interface, Settings, check_options, scenario_of
 from wsn_env.envs.observations import Follower, ObservationName
 from wsn_env.envs.one_thread import Busy, one_thread
 from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera, RenderMode
@@ -68,7 +68,7 @@ class ClusterEnv(TellsHorizon, gym.Env):
         **overrides: Unpack[Quantities],
     ) -> None:
         self.scenario: Scenario = scenario_of(scenario, overrides, type(self))
-        check_one_target(self.scenario)
+        self.scenario.check_one_target("ClusterEnv")
         self._camera = None if render_mode is None else Camera(self.scenario, render_mode, frame_px)
         self.interface: Interface = Interface(self.scenario, Settings(action, observation, reward, order, candidates))
         self._tells_mask: bool = action_mask

@@ -12,7 +12,7 @@ from wsn_env.envs.actions import Action, ActionName, make_action
 from wsn_env.envs.observations import Observation, ObservationName, make_observation
 from wsn_env.envs.rewards import RewardName, make_reward, reward_space
 from wsn_env.models.measurement.base import Order
-from wsn_env.models.quantity import ScenarioError, UnknownKeyword, UnknownQuantity, short, suggest, whole_number
+from wsn_env.models.quantity import UnknownKeyword, UnknownQuantity, short, suggest, whole_number
 from wsn_env.models.state import Cluster
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.view import View
@@ -49,15 +49,6 @@ def scenario_of(scenario: str | Scenario, overrides: Any, environment: type) -> 
             getattr(environment, "shown_as", environment.__name__),
         )
         raise UnknownKeyword(f"{shown}() got an unexpected keyword argument {problem.name!r}: {hint}") from None
-
-
-def check_one_target(scenario: Scenario) -> None:
-    """Raise ScenarioError where the scenario has several."""
-    if scenario.targets > 1:
-        raise ScenarioError(
-            f"Scenario.targets = {scenario.targets}: must be 1 here; MultiEnv and MultiVectorEnv take several, as"
-            " gym.make('wsn_env/Multi-v0', targets=...) makes them"
-        )
 
 
 def check_options(options: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import gymnasium as gym
@@ -13,19 +14,36 @@ from gymnasium.vector.utils import batch_space
 from wsn_env.envs.interface import check_options
 from wsn_env.envs.rendering.camera import FPS, RENDER_MODES
 from wsn_env.envs.spec import TellsHorizon
-from wsn_env.envs.vector_env import ClusterVectorEnv, check_reset_mask, row_seeds
-from wsn_env.models.quantity import whole_number
+from wsn_env.envs.vector_env import ClusterVectorEnv, check_reset_mask, row_seeds, stack_actions
+from wsn_env.models.quantity import UnknownKeyword, whole_number
 from wsn_env.models.state import Cluster
 from wsn_env.scenario import Scenario
 from wsn_env.simulation.view import View
 
+TARGETS = 3
 SUMS = ("energy_mj", "episode_energy_mj", "reward_energy", "reward_error")  # of infos, over the targets
 
 
 class TargetRows(ClusterVectorEnv):
-    """A row for each target; those of a field stand one after the other, and are reset together."""
+    """A row for each target; those of a field stand one after the other, and are reset together.
+
+    Seeds are of fields, as MultiVectorEnv has them; a seed for each row counts if it is of a field's first.
+    """
 
     takes_several_targets, shown_as = True, "MultiVectorEnv"
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """New episodes, in whole fields."""
+        targets, fields = self.scenario.targets, self.num_envs // self.scenario.targets
+        if not isinstance(seed, (list, tuple, np.ndarray)) or len(seed) == fields:
+            seed = np.repeat(np.array(row_seeds(seed, fields), object), targets).tolist()
+        mask = options.get("reset_mask") if isinstance(options, Mapping) else None
+        if isinstance(mask, np.ndarray) and mask.shape == (self.num_envs,):
+            if (mask.reshape(-1, targets) != mask[::targets, None]).any():
+                raise ValueError(f"options['reset_mask'] = {mask!r}: must mark all {targets} rows of a field, or none")
+        return super().reset(seed=seed, options=options)
 
     def _draw_keys(self, rows: np.ndarray) -> np.ndarray:
         """One for each field, from the generator of its first row."""
@@ -46,7 +64,7 @@ class MultiVectorEnv(TellsHorizon, gym.vector.VectorEnv):
     Args:
         num_envs: B.
         scenario: an id such as "PreDC-v0", or a Scenario.
-        targets: M; None: the scenario's.
+        targets: M; None: those of a Scenario, 3 of an id.
         The rest: as ClusterVectorEnv, but for vector rewards and pictures.
     """
 
@@ -68,8 +86,9 @@ class MultiVectorEnv(TellsHorizon, gym.vector.VectorEnv):
         if reward == "vector":
             raise ValueError("reward = 'vector': must be 'error' or 'belief' with several targets")
         self.num_envs: int = whole_number("num_envs", num_envs, 1)
+        usual = scenario.targets if isinstance(scenario, Scenario) else TARGETS
         scenario = Scenario.of(scenario)
-        self.targets: int = scenario.targets if targets is None else whole_number("targets", targets, 1)
+        self.targets: int = whole_number("targets", usual if targets is None else targets, 1)
         more |= dict(scenario=scenario, targets=self.targets, reward=reward)
         self.rows: TargetRows = TargetRows(self.num_envs * self.targets, **more)
         self.scenario: Scenario = self.rows.scenario
@@ -87,12 +106,12 @@ class MultiVectorEnv(TellsHorizon, gym.vector.VectorEnv):
     ) -> tuple[Any, dict[str, Any]]:
         """New episodes; seeds and options["reset_mask"] are of fields, as ClusterVectorEnv.reset has them of rows."""
         check_options(options)
-        seeds: Any = np.repeat(np.array(row_seeds(seed, self.num_envs), object), self.targets).tolist()
         mask = (options or {}).get("reset_mask")
         if mask is not None:
             check_reset_mask(mask, self.num_envs)
             options = {**(options or {}), "reset_mask": np.repeat(mask, self.targets)}
-        observation, info = self.rows.reset(seed=None if seed is None else seeds, options=options)
+        seeds: Any = row_seeds(seed, self.num_envs)
+        observation, info = self.rows.reset(seed=seeds, options=options)
         return self._fold(observation), self._fold_info(info)
 
     def step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
@@ -102,7 +121,7 @@ class MultiVectorEnv(TellsHorizon, gym.vector.VectorEnv):
             actions: (B, M, ...) of the action space; or a Cluster of B * M rows, as policies choose it of `view`.
         """
         if not isinstance(actions, Cluster):
-            actions = self._unfold(actions)
+            actions = self._unfold(stack_actions(actions))
         observation, reward, terminated, truncated, info = self.rows.step(actions)
         first = slice(None, None, self.targets)
         self.rewards = reward.reshape(self.num_envs, self.targets)
@@ -138,6 +157,10 @@ class MultiVectorEnv(TellsHorizon, gym.vector.VectorEnv):
     def horizon(self) -> int:
         """Time steps of an episode."""
         return self.rows.horizon
+
+    def reference_all_awake_m(self) -> np.ndarray:
+        """(B, M) as ClusterVectorEnv has it."""
+        return self._fold(self.rows.reference_all_awake_m())
 
     def action_masks(self) -> np.ndarray:
         """(B, M, n) bool: which actions of each target differ from others now."""
@@ -202,6 +225,9 @@ class MultiEnv(TellsHorizon, gym.Env):
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": FPS}
 
     def __init__(self, scenario: str | Scenario = "PreDC-v0", targets: int | None = None, **more: Any) -> None:
+        for name in ("num_envs", "autoreset_mode", "threads", "max_episode_steps"):
+            if name in more:
+                raise UnknownKeyword(f"MultiEnv() got an unexpected keyword argument {name!r}: it is of MultiVectorEnv")
         self.fields: MultiVectorEnv = MultiVectorEnv(1, scenario, targets, **more, autoreset_mode="Disabled", threads=1)
         self.scenario, self.targets = self.fields.scenario, self.fields.targets
         self.render_mode = self.fields.render_mode
@@ -213,8 +239,10 @@ class MultiEnv(TellsHorizon, gym.Env):
         """A new episode: seed fixes field, tracks and every draw."""
         check_options(options)
         seed = None if seed is None else whole_number("seed", seed, 0)
-        super().reset(seed=seed)
+        if seed is None and self._np_random is not None:
+            self.fields.rows.use_generator(0, self._np_random)
         observation, info = self.fields.reset(seed=seed)
+        self._np_random, self._np_random_seed = self.fields.np_random[0], self.fields.np_random_seed[0]
         self._ended = False
         return _only(observation), self._own(info)
 
@@ -232,6 +260,15 @@ class MultiEnv(TellsHorizon, gym.Env):
         observation, reward, terminated, truncated, info = self.fields.step(action)
         self._ended = bool(terminated[0] or truncated[0])
         return _only(observation), float(reward[0]), bool(terminated[0]), bool(truncated[0]), self._own(info)
+
+    @property
+    def lam(self) -> np.ndarray:
+        """(1,) the present episode's trade-off [m/mJ]."""
+        return self.fields.lam
+
+    def reference_all_awake_m(self) -> np.ndarray:
+        """(M,) as ClusterEnv has it."""
+        return self.fields.reference_all_awake_m()[0]
 
     @property
     def view(self) -> View:

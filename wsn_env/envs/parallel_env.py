@@ -6,6 +6,7 @@ from collections.abc import Callable
 from copy import deepcopy
 from typing import Any, Literal, Protocol
 
+import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
@@ -15,18 +16,16 @@ except ImportError:
     raise ImportError("wsn_env.parallel_env needs pettingzoo: pip install 'wsn_env[multi]'") from None
 
 from wsn_env.envs.multi_env import MultiEnv
+from wsn_env.envs.registration import MULTI
 from wsn_env.scenario import Scenario
 
-BIDS = np.array(
-    [-1.0, 1 / 3, 2 / 3, 1.0]
-)  # scores of a node that sleeps, and of one that offers to lead, more and more
+# Scores of a node that sleeps, and of one that offers to lead, more and more.
+BIDS = np.array([-1.0, 1 / 3, 2 / 3, 1.0], np.float32)
 
 
 def parallel_env(name: str | Scenario = "Multi-v0", **arguments: Any) -> ParallelClusterEnv:
-    """A ParallelClusterEnv by the name of a scenario; "Multi-v0" is PreDC-v0 with three targets."""
-    if name == "Multi-v0":
-        name, arguments = "PreDC-v0", {"targets": 3} | arguments
-    return ParallelClusterEnv(name, **arguments)
+    """A ParallelClusterEnv by the name of a scenario; "Multi-v0" is PreDC-v0."""
+    return ParallelClusterEnv("PreDC-v0" if name in ("Multi-v0", MULTI) else name, **arguments)
 
 
 class ParallelClusterEnv(ParallelEnv):
@@ -60,7 +59,7 @@ class ParallelClusterEnv(ParallelEnv):
                     raise ValueError(f"{name} = {more[name]!r}: must be {value!r} with agents = 'candidates'")
             more |= {"action": "scores", "observation": "candidates"}
         self.env: MultiEnv = MultiEnv(scenario, targets, **more)
-        self.metadata: dict[str, Any] = {"name": "wsn_env/Multi-v0", **self.env.metadata}
+        self.metadata: dict[str, Any] = {"name": f"wsn_env/{self.env.scenario.name}", **self.env.metadata}
         self.render_mode = self.env.render_mode
         faces: dict[str, Callable[[MultiEnv], _Face]] = {"targets": _Targets, "candidates": _Candidates}
         self._face: _Face = faces[agents](self.env)
@@ -90,6 +89,11 @@ class ParallelClusterEnv(ParallelEnv):
         Args:
             actions: of every agent.
         """
+        if not self.agents:
+            raise gym.error.ResetNeeded("the episode has ended, or has not begun: call reset()")
+        missing = [agent for agent in self.agents if agent not in actions]
+        if missing:
+            raise ValueError(f"actions: {', '.join(missing[:5])} must have one each")
         observation, reward, terminated, truncated, info = self.env.step(self._face.joint(actions))
         of_targets = self.env.fields.rewards
         rewards = {
@@ -159,7 +163,7 @@ class _Candidates:
         encoder: Any = env.fields.rows.interface.observation
         self._belief, (self._count, self._width) = encoder.belief, encoder.shape
         self._space = env.fields.rows.single_observation_space
-        self._targets = env.targets
+        self._targets, self._bids = env.targets, spaces.Discrete(len(BIDS))
         self.target_of = {f"target_{k}/node_{j}": k for k in range(env.targets) for j in range(self._count)}
 
     def observation_space(self) -> spaces.Space[Any]:
@@ -176,8 +180,10 @@ class _Candidates:
         return {agent: np.concatenate([about[k], own[k, j]]) for agent, (k, j) in zip(self.target_of, places)}
 
     def joint(self, actions: dict[str, Any]) -> np.ndarray:
-        bids = np.array([actions[agent] for agent in self.target_of], dtype=np.int64)
-        return BIDS[bids].reshape(self._targets, self._count).astype(np.float32)
+        for agent in self.target_of:
+            if not self._bids.contains(actions[agent]):
+                raise ValueError(f"actions[{agent!r}] = {actions[agent]!r:.80}: must be 0, 1, 2 or 3")
+        return BIDS[[int(actions[agent]) for agent in self.target_of]].reshape(self._targets, self._count)
 
 
 def _at(observation: Any, target: int) -> Any:

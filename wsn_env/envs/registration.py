@@ -28,7 +28,7 @@ def register_envs() -> None:
             MULTI,
             f"{several}:MultiEnv",
             vector_entry_point=f"{several}:MultiVectorEnv",
-            kwargs={"scenario": "PreDC-v0", "targets": 3},
+            kwargs={"scenario": "PreDC-v0"},
         )
 
 

@@ -14,7 +14,7 @@ from gymnasium.vector.utils import batch_space
 from wsn_env.compiled import draws
 from wsn_env.envs.actions import ActionName
 from wsn_env.envs.info import outcomes_by_name
-from wsn_env.envs.interface import Interface, Settings, check_one_target, check_options, scenario_of
+from wsn_env.envs.interface import Interface, Settings, check_options, scenario_of
 from wsn_env.envs.observations import Follower, ObservationName
 from wsn_env.envs.one_thread import Busy, one_thread
 from wsn_env.envs.rendering.camera import FPS, RENDER_MODES, Camera, RenderMode
@@ -78,7 +78,7 @@ class ClusterVectorEnv(TellsHorizon, gym.vector.VectorEnv):
         self.render_mode: RenderMode | None = render_mode
         self.scenario: Scenario = scenario_of(scenario, overrides, type(self))
         if not self.takes_several_targets:
-            check_one_target(self.scenario)
+            self.scenario.check_one_target("ClusterVectorEnv")
         self._camera = None if render_mode is None else Camera(self.scenario, render_mode, frame_px)
         self.world: World = World(self.scenario, threads, fast)
         settings = Settings(action, observation, reward, order, candidates)
@@ -179,7 +179,7 @@ class ClusterVectorEnv(TellsHorizon, gym.vector.VectorEnv):
         if isinstance(actions, Cluster):
             cluster = choice_of(actions, self._state)
         else:
-            cluster = self.interface.action.cluster(_stack_actions(actions), self._view)
+            cluster = self.interface.action.cluster(stack_actions(actions), self._view)
         outcome = self.world.advance(self._state, *cluster)
         reward, info = self.interface.reward_and_info(outcomes_by_name(outcome.row), self._state.lam)
         self._squares += np.where(self._state.period > self.scenario.unscored, outcome.error_m * outcome.error_m, 0.0)
@@ -251,6 +251,10 @@ class ClusterVectorEnv(TellsHorizon, gym.vector.VectorEnv):
             for _ in range(count):
                 draws.episode_key(cast(np.random.Generator, generator))
 
+    def use_generator(self, row: int, generator: np.random.Generator) -> None:
+        """Let a row's next episodes be drawn by this generator."""
+        self._generators[row] = generator
+
     @property
     def np_random_seed(self) -> tuple[int | None, ...]:  # type: ignore[override]
         """(B,) the seeds that the rows' generators began with; None before the first reset."""
@@ -269,6 +273,8 @@ class ClusterVectorEnv(TellsHorizon, gym.vector.VectorEnv):
     @property
     def lam(self) -> np.ndarray:
         """(B,) the present episodes' trade-offs [m/mJ]."""
+        if self._state is None:
+            raise gym.error.ResetNeeded("call reset() first")
         return self._state.lam
 
     @property
@@ -360,7 +366,7 @@ def row_seeds(seed: Any, rows: int) -> list[int | None]:
     return [None if each is None else whole_number("seed", each, 0) for each in seed]
 
 
-def _stack_actions(actions: Any) -> Any:
+def stack_actions(actions: Any) -> Any:
     """A dict of arrays from a list of dicts, as policies' predict() gives them; anything else as it is."""
     several = isinstance(actions, (list, tuple)) or (isinstance(actions, np.ndarray) and actions.ndim)
     if several and len(actions) and isinstance(actions[0], dict):

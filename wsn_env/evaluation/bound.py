@@ -38,6 +38,7 @@ def error_bound(policy: Policy | str, scenario: Scenario | str, episodes: int = 
         ValueError: where the scenario has no bound, or a node dies.
     """
     scenario = Scenario.of(scenario)
+    scenario.check_one_target("a bound")
     (policy,) = named_policies(policy if isinstance(policy, str) else {"policy": policy}, scenario).values()
     world, seeds = World(scenario), rollout.evaluation_seeds(seed, episodes)
     bound, squares = Bound(scenario, world.threads), []

@@ -122,7 +122,7 @@ class Evaluation:
                 summary = self.summary(policy, lam)
                 cells = [f"{lam:g}", policy, *(summary[column].text for column in what)]
                 rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
-        title = f"{self.scenario.name}, {self.episodes} common episodes, seed {self.seed}; means, 95 % intervals"
+        title = f"{self.scenario.title}, {self.episodes} common episodes, seed {self.seed}; means, 95 % intervals"
         return f"<table><caption>{escape(title)}</caption><tr>{head}</tr>{''.join(rows)}</table>"
 
     def families(self) -> list[str]:
@@ -249,7 +249,7 @@ def evaluate(  # noqa: PLR0913
             for episode, values in enumerate(change_lam(measured, lam)):
                 row: dict[str, Any] = {
                     "policy": name,
-                    "scenario": scenario.name,
+                    "scenario": scenario.title,
                     "episode": episode,
                     "seed": seeds[episode],
                 } | values

@@ -54,6 +54,6 @@ def unwrap_native(envs: VectorEnv) -> NativeEnvs:
         ValueError: another environment.
     """
     native = envs.unwrapped
-    if not hasattr(type(native), "lam"):
-        raise ValueError(f"envs = {type(native).__name__}: must be {NATIVE}")
+    if not hasattr(type(native), "lam") or hasattr(native, "targets"):
+        raise ValueError(f"envs = {type(native).__name__}: must be {NATIVE}; of MultiVectorEnv its `rows`")
     return cast(NativeEnvs, native)

@@ -34,6 +34,7 @@ def score(act: Callable[[Any], Any], envs: VectorEnv | gym.Env, seed: int = 0) -
     unwrapped = getattr(envs, "unwrapped", envs)
     if not isinstance(unwrapped, (ClusterVectorEnv, ClusterEnv)):
         raise ValueError(f"envs = {type(unwrapped).__name__}: must be {NATIVE}, or a single environment")
+    unwrapped.scenario.check_one_target("score")
     if not callable(act):
         raise ValueError(f"act = {short(repr(act))}: must be a function of the observations of all rows")
     if unwrapped.scenario.ends_outside:

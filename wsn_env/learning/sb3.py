@@ -37,6 +37,8 @@ class SB3VecEnv(VecEnv):
             raise ValueError("reward 'vector': stable-baselines3 learns from one number, use 'error' or 'belief'")
         if stagger and self._mode != AutoresetMode.DISABLED:
             raise ValueError("stagger=True needs autoreset_mode Disabled")
+        if stagger and getattr(self._native, "takes_several_targets", False):
+            raise ValueError("stagger=True: the targets of a field end together")
         self.envs = envs
         self.seconds: float = 0.0  # wall time spent in step and reset
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)

@@ -30,6 +30,7 @@ def plot_episode(policy: str | Policy, scenario: str | Scenario, seed: int = FIR
     Returns: the axes.
     """
     scenario, seed = Scenario.of(scenario), whole_number("seed", seed, 0)
+    scenario.check_one_target("plot_episode")
     name = policy if isinstance(policy, str) else type(policy).__name__
     (made,) = named_policies(policy if isinstance(policy, str) else {name: policy}, scenario).values()
     heads, targets, estimates, energies = [], [], [], []

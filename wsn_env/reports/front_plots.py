@@ -135,4 +135,4 @@ def front_title(evaluation: Evaluation) -> str:
     """Scenario, lams and number of episodes."""
     lams = evaluation.lams
     span = f"lam = {min(lams):g} to {max(lams):g} m/mJ" if len(lams) > 1 else f"lam = {lams[0]:g} m/mJ"
-    return f"{evaluation.scenario.name}, {span}, {evaluation.episodes} paired episodes"
+    return f"{evaluation.scenario.title}, {span}, {evaluation.episodes} paired episodes"

@@ -90,7 +90,7 @@ def plot_comparison(
     axes.set_xlabel("energy [mJ per time step]")
     axes.set_ylabel("mean error [m]")
     axes.set_title(
-        escape_label(f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes")
+        escape_label(f"{evaluation.scenario.title}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes")
     )
     axes.grid(alpha=0.3)
     write_labels(axes, labels)

@@ -140,7 +140,7 @@ def narrow_table(title: str, columns: list[str]) -> Any:
 
 def _terminal_table(evaluation: Evaluation, lam: float, reference: str, shown: list[str]) -> Any:
     cap, dying = evaluation.scenario.error_cap_m, nodes_die(evaluation)
-    title = f"{evaluation.scenario.name}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes"
+    title = f"{evaluation.scenario.title}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes"
     error = ["RMS m"] if cap is None else ["capped m"]
     error += ["/ref"] if has_reference(evaluation.scenario) else []
     last = "functional" if dying else "lost"
@@ -180,7 +180,8 @@ def format_markdown(evaluation: Evaluation, lam: float, reference: str) -> str:
 def save_markdown(evaluation: Evaluation, folder: str | Path) -> None:
     """Write evaluation.md: a table for each lam, compared with the first policy."""
     parts = [
-        f"## {escape_markdown(evaluation.scenario.name)}, lam = {lam:g} m/mJ, {evaluation.episodes} paired episodes\n\n"
+        f"## {escape_markdown(evaluation.scenario.title)}, lam = {lam:g} m/mJ,"
+        + f" {evaluation.episodes} paired episodes\n\n"
         + format_markdown(evaluation, lam, evaluation.policies[0])
         + f"\nMeans with 95 % bootstrap intervals; {describe_reference(evaluation)}.\n"
         + "".join(f"\n{escape_markdown(line)}\n" for line in describe_best_in_hindsight(evaluation, lam))

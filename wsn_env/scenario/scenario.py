@@ -134,6 +134,19 @@ class Scenario(Section):
         if self.targets > 1:
             self._check_several_targets()
 
+    @property
+    def title(self) -> str:
+        """Its name, with the number of targets where they are several: for tables and pages."""
+        return self.name if self.targets == 1 else f"{self.name}, {self.targets} targets"
+
+    def check_one_target(self, of_what: str) -> None:
+        """Raise ScenarioError where there are several."""
+        if self.targets > 1:
+            raise ScenarioError(
+                f"Scenario.targets = {self.targets}: must be 1 for {of_what}; several are for evaluate, replay and"
+                " gym.make('wsn_env/Multi-v0', targets=...)"
+            )
+
     def _check_several_targets(self) -> None:
         """Raise ScenarioError for what is made for one."""
         m = self.measurement

@@ -39,10 +39,17 @@ def count_life(state: Any, b: int, error_m: float, t: Any) -> None:
     if life.functional == 0 and period >= len(recent_m) and life.window_m > len(recent_m) * t.radius_m:
         life.functional = period
     life.tracked += error_m <= t.radius_m
+    count_dead(state, b)
+
+
+@lean_piece
+def count_dead(state: Any, b: int) -> None:
+    """Note the period, if in it the first node, or half of them, have died."""
+    period, life = state.row[b].period, state.life[b]
     nodes, living = state.residual_j.shape[1], state.living[b]
-    if life.first_death == 0 and living < nodes:
+    if period > 0 and life.first_death == 0 and living < nodes:
         life.first_death = period
-    if life.half_dead == 0 and 2 * living <= nodes:
+    if period > 0 and life.half_dead == 0 and 2 * living <= nodes:
         life.half_dead = period
 
 

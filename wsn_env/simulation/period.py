@@ -16,7 +16,7 @@ from wsn_env.models.state import KEEP_CLUSTER, KEEP_HEAD, NOBODY, belief_at, sta
 from wsn_env.simulation import messages
 from wsn_env.simulation.faults import fail_nodes
 from wsn_env.simulation.geometry import nearest_living
-from wsn_env.simulation.lifetime import count_life
+from wsn_env.simulation.lifetime import count_dead, count_life
 from wsn_env.simulation.messages import Episode
 from wsn_env.simulation.sensing import is_awake, memory_of, send_late, sense, target_of, wake
 
@@ -36,19 +36,21 @@ def run(
     """
     heads, chosen = cluster
     state, c = state_at(handle), cs[0]
-    scratch = make_scratch(state.belief.particles.shape[2])
+    scratch, resampled = make_scratch(state.belief.particles.shape[2]), np.zeros(c.targets, np.bool_)
     count = 0
-    for b in range(start, stop):
-        out = outcomes[b]
-        episode = Episode(state, b, out, b - b % c.targets, c.targets)
-        _sense_and_report(heads[b], chosen[b], episode, c)
-        key, period = state.key[b], state.row[b].period
-        if c.tracking.redraw and out.handover:
-            redraw_row(key, period, state.belief, b)
-        head = AtHead(state.belief, state.network, state.reports, b)
-        resampled = filter_row(key, period, head, c, maps, scratch)
-        count += _conclude(resampled, episode, c.radio, c.tracking)
-        predict_reports(c.measurement, state.belief, state.network.positions[b], b, c, maps, scratch.weights)
+    for first in range(start, stop, c.targets):
+        for b in range(first, first + c.targets):
+            out = outcomes[b]
+            _sense_and_report(heads[b], chosen[b], Episode(state, b, out, first, c.targets), c)
+            key, period = state.key[b], state.row[b].period
+            if c.tracking.redraw and out.handover:
+                redraw_row(key, period, state.belief, b)
+            head = AtHead(state.belief, state.network, state.reports, b)
+            resampled[b - first] = filter_row(key, period, head, c, maps, scratch)
+        for b in range(first, first + c.targets):
+            episode = Episode(state, b, outcomes[b], first, c.targets)
+            count += _conclude(resampled[b - first], episode, c.radio, c.tracking)
+            predict_reports(c.measurement, state.belief, state.network.positions[b], b, c, maps, scratch.weights)
     return count
 
 
@@ -258,6 +260,7 @@ def _settle(episode, r, t):
         for row in range(episode.first, episode.first + episode.targets):
             if row != b:
                 _remove_dead_nodes(Episode(state, row, out, episode.first, episode.targets), r)
+                count_dead(state, row)
     if state.row[b].period > 0 and state.reports.count[b] > 0:  # in period 0 nothing was predicted
         note_surprise(belief)
     total = 0.0

@@ -11,7 +11,7 @@ from wsn_env.models.state import state_at
 from wsn_env.simulation import messages
 from wsn_env.simulation.faults import what_is_sensed
 from wsn_env.simulation.messages import Episode
-from wsn_env.simulation.sensing import sense, target_of
+from wsn_env.simulation.sensing import is_awake, sense, target_of
 
 
 @lean_kernel
@@ -32,7 +32,7 @@ def search(
         out.searched = True
         state.row[b].last_search = state.row[b].period
         episode = Episode(state, b, out, b - b % c.targets, c.targets)
-        strongest = _wake_all(episode, c)
+        strongest = _wake_all(episode, rows, c)
         if strongest >= 0:
             # The new head takes over (the velocity is handed to it) and hears the others.
             if c.radio.to_head and messages.take_over(strongest, episode, c.radio):
@@ -55,8 +55,11 @@ def search(
 
 
 @lean_piece
-def _wake_all(episode, c):
+def _wake_all(episode, rows, c):
     """Wake-up call to all, sensing by those that slept.
+
+    Args:
+        rows: (B,) bool, which search.
 
     Returns: the living node with the strongest signal of the target, the first by number where signals are alike; -1:
     nobody detects it.
@@ -76,6 +79,8 @@ def _wake_all(episode, c):
             continue
         # Of those that are dead, unknown to the network, it reckons with the same: it cannot tell them from others.
         living = residual_j[node] > 0.0
+        for row in range(episode.first, episode.first + episode.targets):
+            awake |= row != b and (is_awake(node, network, row) or (row < b and rows[row]))
         woken = messages.spend(node, call, messages.SEARCH, episode) and living
         if not awake:
             living = residual_j[node] > 0.0

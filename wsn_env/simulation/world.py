@@ -161,6 +161,8 @@ class World:
             lost = outcome.searched.copy()
             self._search(lost, state, outcome)
             self._in_rows(lost, period.settle, outcome.row, state.handle)
+        if self.scenario.targets > 1:
+            outcome.row["alive"] = state.living  # a target's own was before the others had spent
         return outcome
 
     def left(self, state: State) -> np.ndarray:

@@ -122,6 +122,7 @@ def complete_settings(settings: Training) -> Scenario:
     if settings.tracks and Scenario.named(settings.scenario).measurement.lasting_errors:
         raise ValueError(f"Training.tracks: {settings.scenario} is trained in its simulated form; wsn evaluate replays")
     scenario = make_scenario(settings.scenario, settings.set, settings.tracks)
+    scenario.check_one_target("a training")
     settings.lam = settings.lam or list(scenario.lam_span)
     if len(settings.lam) > 2:
         raise ValueError(f"Training.lam = {settings.lam}: must be one number, or two that it is drawn between")

@@ -49,7 +49,7 @@ def write_report(
     title = f"Training {folder.name}"
     if evaluation is not None:
         names = ", ".join(evaluation.policies[:3]) + (", ..." if len(evaluation.policies) > 3 else "")
-        title = f"{evaluation.scenario.name}: {names}"
+        title = f"{evaluation.scenario.title}: {names}"
         made = named_policies(policies, evaluation.scenario) if policies else {}
         samples = sample_sections(evaluation, made, progress) if made else []
         sections = [*_comparison_sections(evaluation), *sections, *samples]
@@ -107,7 +107,7 @@ def settings_section(evaluation: Evaluation | None, training: dict[str, Any] | N
     if evaluation is not None:
         seeds = evaluation_seeds(evaluation.seed, evaluation.episodes)
         facts = {
-            "scenario": evaluation.scenario.name,
+            "scenario": evaluation.scenario.title,
             "lam [m/mJ]": ", ".join(f"{lam:g}" for lam in evaluation.lams),
             "policies": ", ".join(evaluation.policies),
             "episodes": f"{evaluation.episodes:,}",

@@ -44,7 +44,7 @@ def replay(
     seed = whole_number("seed", seed, 0)
     check_writable(out)
     recording = record(named, scenario, seed)
-    page = build_page("replay", f"{scenario.name}, seed {seed}", player_html(recording))
+    page = build_page("replay", f"{scenario.title}, seed {seed}", player_html(recording))
     with replacing(out) as path:
         path.write_text(page, encoding="utf-8")
     return recording
