@@ -105,7 +105,7 @@ def learn_locally(settings: Training, scenario: Scenario, interface: Settings, f
                 watch.save()
         seconds = time.perf_counter() - started
         print(
-            f"trained {left:,} periods in {seconds:.0f} s ({left / seconds:,.0f} a second), "
+            f"trained {left:,} time steps in {seconds:.0f} s ({left / seconds:,.0f} a second), "
             f"{100 * envs.seconds / seconds:.0f} % of it in the environment, "
             f"{(time.process_time() - busy) / seconds:.1f} cores busy"
         )
@@ -153,7 +153,7 @@ def learn_on_ray(settings: Training, scenario: Scenario, interface: Settings, fo
         started, before = time.perf_counter(), training.periods
         training.run(settings.checkpoint_steps, report)
         left, seconds = training.periods - before, time.perf_counter() - started
-        print(f"trained {left:,} periods in {seconds:.0f} s ({left / seconds:,.0f} a second)")
+        print(f"trained {left:,} time steps in {seconds:.0f} s ({left / seconds:,.0f} a second)")
         return training.actor_network()
 
 
