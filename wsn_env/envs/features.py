@@ -31,7 +31,7 @@ BELIEF_FEATURES = {
     "head_detection": share("probability that the head detects the target"),
     "head_nearest": flag("1: no living node is nearer to the prediction than the head"),
     "members": amount("members of the present cluster, without the head", "4 nodes"),
-    "joint_detection": share("probability that a node of the present cluster detects the target"),
+    "joint_detection": share("probability that at least one node of the present cluster detects the target"),
     "sparseness": amount("distance of the ninth nearest candidate to the prediction", "radius"),
 }
 MOTION_FEATURES = {  # behind them

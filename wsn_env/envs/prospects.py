@@ -25,7 +25,7 @@ ENTRY_FEATURES = {
     "energy": amount("root of the expected energy over the scenario's `typical_energy_mj`"),
     "detections": amount("expected number of nodes that detect", "4 nodes"),
     "silence": share("probability that no report comes"),
-    "hold": share("probability that a node of it detects three time steps on, if the target keeps its velocity"),
+    "hold": share("probability that at least one detects three time steps on, if the target keeps its velocity"),
     "head_ahead": Feature("where the head would stand from the prediction, along the velocity", "radius"),
     "head_left": Feature("the same across it, to the left", "radius"),
     "head_distance": amount("distance of that head to the prediction", "radius"),
