@@ -113,7 +113,7 @@ def test_train_learns_with_it(folder):
         "--runs", folder / "runs", "--name", "mine", "--set", "measurement=own_sensor.py:Bearing,sd_deg=2",
         "particles=50", "periods=8",
     )  # fmt: skip
-    assert "trained 1,024 periods" in said and (folder / "runs" / "mine" / "policy.safetensors").exists()
+    assert "trained 1,024 time steps" in said and (folder / "runs" / "mine" / "policy.safetensors").exists()
 
 
 def test_frames_are_drawn(bearing):
