@@ -17,18 +17,8 @@ from benchmarks.race import Result
 
 # Files of this folder; each is a claim, with the command line of race.main. In the order of running.
 CLAIMS = (
-    *(
-        "environment",
-        "vector",
-        "several_targets",
-        "overhead",
-        "nodes",
-        "memory",
-        "many_rows",
-        "episodes",
-        "training",
-        "whole_training",
-    ),
+    *("environment", "vector", "several_targets", "overhead", "nodes", "memory"),
+    *("many_rows", "episodes", "training", "whole_training"),
     *("rllib", "recording", "frames", "filter_step", "filter_scaling"),
 )
 LONG = ("many_rows", "training", "whole_training", "rllib", "filter_step", "filter_scaling")  # a glance leaves them out

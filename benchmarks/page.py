@@ -22,19 +22,8 @@ ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "performance.md"
 RESULTS = ROOT / "benchmarks" / "results"
 ORDER = (
-    *(
-        "filter_step",
-        "environment",
-        "vector",
-        "several_targets",
-        "overhead",
-        "training",
-        "rllib",
-        "filter_scaling",
-        "nodes",
-        "memory",
-    ),
-    *("recording", "frames"),
+    *("filter_step", "environment", "vector", "several_targets", "overhead", "training", "rllib"),
+    *("filter_scaling", "nodes", "memory", "recording", "frames"),
 )
 EVERY_IMPLEMENTATION = ("particles", "rows")  # plots that stand together, at the end
 ENVIRONMENTS = "env_rows"  # joins the second of them

@@ -244,7 +244,7 @@ class MultiEnv(TellsHorizon, gym.Env):
         observation, info = self.fields.reset(seed=seed)
         self._np_random, self._np_random_seed = self.fields.np_random[0], self.fields.np_random_seed[0]
         self._ended = False
-        return _only(observation), self._own(info)
+        return part_of(observation, 0), self._own(info)
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """One period.
@@ -259,7 +259,7 @@ class MultiEnv(TellsHorizon, gym.Env):
             action = {k: np.asarray(v)[None] for k, v in action.items()} if several else np.asarray(action)[None]
         observation, reward, terminated, truncated, info = self.fields.step(action)
         self._ended = bool(terminated[0] or truncated[0])
-        return _only(observation), float(reward[0]), bool(terminated[0]), bool(truncated[0]), self._own(info)
+        return part_of(observation, 0), float(reward[0]), bool(terminated[0]), bool(truncated[0]), self._own(info)
 
     @property
     def lam(self) -> np.ndarray:
@@ -302,11 +302,11 @@ class MultiEnv(TellsHorizon, gym.Env):
         }
 
 
-def _only(observation: Any) -> Any:
-    """Of a batch of one."""
+def part_of(observation: Any, index: int) -> Any:
+    """One entry of the first axis, of an array or of each in a dict."""
     if isinstance(observation, dict):
-        return {name: _only(value) for name, value in observation.items()}
-    return observation[0]
+        return {name: part_of(value, index) for name, value in observation.items()}
+    return observation[index]
 
 
 def _of_targets(space: Any, targets: int) -> Any:

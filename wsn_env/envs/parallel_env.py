@@ -15,8 +15,9 @@ try:
 except ImportError:
     raise ImportError("wsn_env.parallel_env needs pettingzoo: pip install 'wsn_env[multi]'") from None
 
-from wsn_env.envs.multi_env import MultiEnv
+from wsn_env.envs.multi_env import MultiEnv, part_of
 from wsn_env.envs.registration import MULTI
+from wsn_env.envs.vector_env import stack_actions
 from wsn_env.scenario import Scenario
 
 # Scores of a node that sleeps, and of one that offers to lead, more and more.
@@ -150,10 +151,10 @@ class _Targets:
         return deepcopy(self._rows.single_action_space)
 
     def observe(self, observation: Any) -> dict[str, Any]:
-        return {agent: _at(observation, target) for agent, target in self.target_of.items()}
+        return {agent: part_of(observation, target) for agent, target in self.target_of.items()}
 
     def joint(self, actions: dict[str, Any]) -> Any:
-        return _stacked([actions[agent] for agent in self.target_of])
+        return stack_actions([actions[agent] for agent in self.target_of])
 
 
 class _Candidates:
@@ -184,15 +185,3 @@ class _Candidates:
             if not self._bids.contains(actions[agent]):
                 raise ValueError(f"actions[{agent!r}] = {actions[agent]!r:.80}: must be 0, 1, 2 or 3")
         return BIDS[[int(actions[agent]) for agent in self.target_of]].reshape(self._targets, self._count)
-
-
-def _at(observation: Any, target: int) -> Any:
-    if isinstance(observation, dict):
-        return {name: _at(value, target) for name, value in observation.items()}
-    return observation[target]
-
-
-def _stacked(actions: list[Any]) -> Any:
-    if isinstance(actions[0], dict):
-        return {name: np.stack([each[name] for each in actions]) for name in actions[0]}
-    return np.stack([np.asarray(each) for each in actions])

@@ -137,24 +137,26 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
         "variance_ratio": ratios / np.maximum(counted_periods, 1),
     }
     if targets > 1:
-        columns = {name: _over_targets(name, values.reshape(-1, targets)) for name, values in columns.items()}
+        columns = {name: OVER_TARGETS[name](each.reshape(-1, targets), axis=1) for name, each in columns.items()}
     return [{name: values[i].item() for name, values in columns.items()} for i in range(len(seeds))]
 
 
-SUMS = "return", "sum_error_m", "sum_energy_mj", "energy_mj", "members", "handovers", "searches", "lost"
-MEANS = "error_m", "tracked", "anees", "variance_ratio"
-ROOT_MEAN_SQUARES = "rms_m", "reference_m", "reference_all_awake_m"
+def _root_mean_square(values: np.ndarray, axis: int) -> np.ndarray:
+    return np.sqrt((values * values).mean(axis=axis)) if values.dtype.kind == "f" else values[:, -1]  # "": none
 
 
-def _over_targets(name: str, values: np.ndarray) -> np.ndarray:
-    """A column (B, M) of the targets as one of their fields (B,); what they share stands in the last one's."""
-    if name in SUMS:
-        return values.sum(axis=1)
-    if name in MEANS:
-        return values.mean(axis=1)
-    if name in ROOT_MEAN_SQUARES and values.dtype.kind == "f":
-        return np.sqrt((values * values).mean(axis=1))
-    return values.min(axis=1) if name == "functional" else values[:, -1]
+def _shared(values: np.ndarray, axis: int) -> np.ndarray:
+    return values[:, -1]
+
+
+OVER_TARGETS: dict[str, Callable[..., np.ndarray]] = {  # how a column of a field is made of those of its targets
+    **dict.fromkeys(("return", "sum_error_m", "sum_energy_mj", "energy_mj"), np.sum),
+    **dict.fromkeys(("members", "handovers", "searches", "lost"), np.sum),
+    **dict.fromkeys(("error_m", "tracked", "anees", "variance_ratio"), np.mean),
+    **dict.fromkeys(("rms_m", "reference_m", "reference_all_awake_m"), _root_mean_square),
+    **dict.fromkeys(("lam", "periods", "first_death", "half_dead", "stranded_mj", "stranded_sd"), _shared),
+    "functional": np.min,
+}
 
 
 def _position_nees(state: State, outcome: Outcome) -> tuple[np.ndarray, np.ndarray]:
