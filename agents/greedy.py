@@ -22,6 +22,9 @@ from wsn_env.scenario.constants import common_constants
 from wsn_env.simulation.view import View
 
 CANDIDATES = 12
+LEAST_SHARE = 0.8  # of the chance of detection at the nearest node, with which a shared node may lead
+SAVED = 0.5  # of what it saves that counts there: the targets part again
+TURNS = 2  # of each target to choose, where there are several
 LEAST_DETECTION = 1e-6  # down to it `gain` tells probabilities apart
 
 
@@ -42,9 +45,13 @@ class Greedy(ViewPolicy):
     its price is lam times the energy of the report, and of the invitation where the node has to be called. Two such
     clusters compete: one about the standing head, and one about the node nearest to the prediction, which has to
     make up for the handover. Each row takes the terms whose lam is nearest to its own on the logarithmic scale.
+
+    Several targets of a field choose one after the other, twice; a node that is in the cluster of another is awake
+    anyhow: being awake has no price, also where it leads.
     """
 
     terms: Sequence[Sequence[float]] | None = None  # None: tuned for the scenario's name; else usual ones
+    jointly: bool = True  # False: each target chooses as if it were alone
 
     def __post_init__(self) -> None:
         chosen: Sequence[Any] | None = self.terms
@@ -71,12 +78,15 @@ class Greedy(ViewPolicy):
         prices = view.lam / terms[:, 1], 1.0 / terms[:, 2]
         table = self._expectations.of_nodes(view, nodes, REPORTS).table
         known = common_constants(self.scenario), view.knowledge.handle
-        _bargain(0, len(nodes), *known, table, prices, (heads, members))
+        targets = int(view.row["targets"].max(initial=1)) if self.jointly else 1
+        if len(nodes) % targets:  # not of whole fields
+            targets = 1
+        _bargain(*known, table, prices, (heads, members), targets)
         return Cluster(heads, members)
 
 
 @kernel
-def _bargain(start, stop, cs, handle, table, prices, cluster):
+def _bargain(cs, handle, table, prices, cluster, targets):
     """Fill in the better of two clusters: about the nearest living node, or about the standing head, where that does no
     worse.
 
@@ -87,10 +97,28 @@ def _bargain(start, stop, cs, handle, table, prices, cluster):
         prices: (B,) of energy over worth of information [m/mJ], and (B,) share of what invitations and handovers cost
             that the period bears.
         cluster: heads (B,) and members (B, K), filled.
+        targets: of a field, whose rows stand one after the other.
     """
-    known, chosen = knowledge_at(handle), np.empty(CANDIDATES, np.int32)
-    for b in range(start, stop):
-        _bargain_in(b, cs[0].radio, known, table, prices, chosen, cluster)
+    known, chosen, (heads, members), r = knowledge_at(handle), np.empty(CANDIDATES, np.int32), cluster, cs[0].radio
+    shares = targets > 1 and r.awake_j > r.asleep_j
+    for first in range(0, len(heads), targets):
+        for turn in range(TURNS if shares else 1):
+            for b in range(first, first + targets):
+                for other in range(first, b if turn == 0 else first + targets):
+                    if other != b and shares:
+                        _mark_shared(table[b], heads[other], members[other])
+                _bargain_in(b, r, known, table, prices, chosen, cluster)
+                for k in range(len(table[b])):
+                    table[b][k].shared = 0
+
+
+@lean_piece
+def _mark_shared(nodes, head, members):
+    """Mark which nodes (EXPECTED) are in a cluster."""
+    for k in range(len(nodes)):
+        nodes[k].shared |= nodes[k].node == head
+        for member in members:
+            nodes[k].shared |= member >= 0 and nodes[k].node == member
 
 
 @lean_piece
@@ -101,10 +129,21 @@ def _bargain_in(b, r, known, table, prices, chosen, cluster):
     old = outlook.nodes[standing].node
     heads[b] = outlook.nodes[nearest].node
     worth = _gather(nearest, outlook, price, r, members[b])
-    if old >= 0 and old != heads[b] and _gather(standing, outlook, price, r, chosen) >= worth:
-        heads[b] = old
-        for k in range(CANDIDATES):
-            members[b, k] = chosen[k]
+    if old >= 0 and old != heads[b]:
+        other = _gather(standing, outlook, price, r, chosen)
+        if other >= worth:
+            heads[b], worth = old, other
+            for k in range(CANDIDATES):
+                members[b, k] = chosen[k]
+    least = LEAST_SHARE * outlook.nodes[nearest].detection
+    for leader in range(CANDIDATES):  # who is awake for another target anyhow
+        node = outlook.nodes[leader]
+        if node.shared and node.node != heads[b] and node.detection >= least:
+            other = _gather(leader, outlook, price, r, chosen)
+            if other > worth:
+                heads[b], worth = node.node, other
+                for k in range(CANDIDATES):
+                    members[b, k] = chosen[k]
 
 
 class Price(NamedTuple):
@@ -124,6 +163,8 @@ def _gather(leader, outlook, price, r, chosen):
         return 0.0
     trace, after = gain(head, 1.0, p)
     total = sd_drop(p, trace) - price.lam * price.part * _handover_mj(outlook, head, r)
+    if head.shared:  # a head is awake in every period: only what it saves tells clusters apart
+        total += SAVED * price.lam * 1e3 * (r.awake_j - r.asleep_j)
     p = after
     for k in range(CANDIDATES):
         node = nodes[k]

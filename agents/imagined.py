@@ -31,7 +31,7 @@ def imagined_world(scenario: Scenario, periods: int, particles: int) -> World:
     Args:
         particles: of a particle filter; 0: a `GaussianTracker`, which cannot read binary sensors.
     """
-    changes: dict[str, Any] = dict(periods=periods, motion="straight", faults=None)
+    changes: dict[str, Any] = dict(periods=periods, motion="straight", faults=None, association="known", targets=1)
     changes |= dict(tracker="particle", particles=max(particles, 2), gate_m=None)
     if not scenario.tracking.switches:
         changes |= dict(filter_q=scenario.filter_q, manoeuvre_q=None)

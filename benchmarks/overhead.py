@@ -126,7 +126,11 @@ class Recorder:
         """A new period."""
         width = max(1, reports.count.max())
         received = Reports(
-            reports.count.copy(), reports.node[:, :width].copy(), reports.value[:, :width].copy(), reports.bitmap
+            reports.count.copy(),
+            reports.node[:, :width].copy(),
+            reports.value[:, :width].copy(),
+            reports.share,
+            reports.bitmap,
         )
         predicted = belief.predicted_mean.copy()
         self.tracker.correct(keys, periods, belief, network, reports, resampled)

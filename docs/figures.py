@@ -48,6 +48,7 @@ MAKERS: dict[str, list[list[str]]] = {  # arguments of Python, one command after
     "particles": [["-m", "studies.particles", "--out", "{out}"]],
     "lifetime": [["-m", "studies.lifetime", "--out", "{out}"]],
     "multi": [["-m", "studies.targets", "--out", "{out}"]],
+    "association": [["-m", "studies.association", "--out", "{out}"]],
     "worlds": [["-m", "studies.worlds", "--scenario", name, *RECORDED, "--out", "{out}"] for name in SHIPPED],
     "reliability": [["-m", "studies.reliability", "--out", "{out}"]],
     "planning": [

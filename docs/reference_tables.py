@@ -20,7 +20,7 @@ from wsn_env.envs.prospects import ENTRY_FEATURES
 from wsn_env.envs.scarcity import ENERGY_FEATURES
 from wsn_env.models.field import Field
 from wsn_env.models.kinds import Registry
-from wsn_env.models.library import DETECTIONS, FAULTS, MEASUREMENTS, MOTIONS, RADIOS
+from wsn_env.models.library import ASSOCIATIONS, DETECTIONS, FAULTS, MEASUREMENTS, MOTIONS, RADIOS
 from wsn_env.reports.markdown import escape_markdown, markdown_table
 from wsn_env.scenario.tracking import Tracking
 
@@ -37,9 +37,10 @@ ROLES: dict[str, Registry] = {
     "detection": DETECTIONS,
     "motion": MOTIONS,
     "radio": RADIOS,
+    "association": ASSOCIATIONS,
     "fault": FAULTS,
 }
-PARTS = "field", "motion", "detection", "measurement", "radio", "tracking"  # of a scenario, with tables of their own
+PARTS = "field", "motion", "detection", "measurement", "radio", "association", "tracking"  # with tables of their own
 
 
 def observed(features: Mapping[str, Feature]) -> str:

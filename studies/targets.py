@@ -3,7 +3,8 @@
     python -m studies.targets --out out/targets
 
 The pretrained policy, which has been trained with one target, beside baselines, for one to five targets: `return.md`.
-With batteries that run empty, the same for 2, 3 and 5: `lifetime.md`.
+With batteries that run empty, the same for 2, 3 and 5: `lifetime.md`. Where being awake costs energy, so that targets
+that meet can share it: `sharing.md`.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import tyro
 
@@ -26,6 +28,7 @@ LAMS = (1.0, 4.0, 16.0)
 TARGETS = (1, 2, 3, 5)
 BASELINES = ("greedy", "adaptive", "pre_dc")
 SIZES = range(7)
+JOINTLY, ALONE, SENSING_NJ = "greedy", "greedy:jointly=false", 100_000.0  # nJ of being awake: as a report of 512 bits
 LASTING = ("greedy", "nearest1", "pre_dc")  # in the second table, beside ppo and a budget for greedy
 
 
@@ -45,7 +48,8 @@ def main(arguments: list[str] | None = None) -> int:
     """Play, print and write the tables."""
     asked = tyro.cli(Targets, args=arguments, description=__doc__)
     asked.out.mkdir(parents=True, exist_ok=True)
-    for name, table in (("return", returns(asked)), ("lifetime", lifetimes(asked))):
+    for name, make in (("return", returns), ("lifetime", lifetimes), ("sharing", sharing)):
+        table = make(asked)
         with replacing(asked.out / f"{name}.md") as path:
             path.write_text(table, encoding="utf-8")
         print(table)
@@ -60,7 +64,7 @@ def returns(asked: Targets) -> str:
         scenario = Scenario.named("PreDC-v0", targets=targets, particles=asked.particles)
         with progress_bar() as report:
             found = evaluate(names, scenario, LAMS, asked.episodes, progress=report)
-        own = [str(Measured.mean(found.values("ppo", lam, "return"))) for lam in LAMS]
+        own = [own_return(found, "ppo", lam) for lam in LAMS]
         rows.append([f"{targets}: **`ppo`**", *own])
         for name in BASELINES:
             rows.append([f"{targets}: `{name}`", *(cell(found, name, lam) for lam in LAMS)])
@@ -76,7 +80,7 @@ def returns(asked: Targets) -> str:
 
 def cell(found: Evaluation, name: str, lam: float) -> str:
     """A baseline's return, and what PPO is better by."""
-    return f"{Measured.mean(found.values(name, lam, 'return'))}: {format_advantage(found, ['ppo'], name, lam)}"
+    return f"{own_return(found, name, lam)}: {format_advantage(found, ['ppo'], name, lam)}"
 
 
 def lifetimes(asked: Targets) -> str:
@@ -94,6 +98,27 @@ def lifetimes(asked: Targets) -> str:
             rows.append([f"{targets}: `{name}`", *cells])
     names = ("capped error m", "first death", "half dead", "functional", "tracked")
     return markdown_table(["targets: policy", *names], rows)
+
+
+def sharing(asked: Targets) -> str:
+    """Greedy choices of all targets together and each alone, and PPO: returns, and by how many percent together is
+    better."""
+    rows = []
+    for targets, motion in ((3, "meeting"), (5, "meeting"), (5, "crossing")):
+        more: dict[str, Any] = dict(targets=targets, motion=motion, sensing_nj=SENSING_NJ, particles=asked.particles)
+        scenario = Scenario.named("PreDC-v0", **more)
+        with progress_bar() as report:
+            found = evaluate([JOINTLY, ALONE, "ppo"], scenario, LAMS, asked.episodes, seed=1, progress=report)
+        rows.append([f"{targets}, {motion}: **`{JOINTLY}`**", *(own_return(found, JOINTLY, lam) for lam in LAMS)])
+        for name in (ALONE, "ppo"):
+            cells = (f"{own_return(found, name, lam)}: {format_advantage(found, [JOINTLY], name, lam)}" for lam in LAMS)
+            rows.append([f"{targets}, {motion}: `{name}`", *cells])
+    return markdown_table(["targets, motion: policy", *(f"lam = {lam:g}" for lam in LAMS)], rows)
+
+
+def own_return(found: Evaluation, name: str, lam: float) -> str:
+    """A policy's mean, with its standard error."""
+    return str(Measured.mean(found.values(name, lam, "return")))
 
 
 if __name__ == "__main__":

@@ -82,6 +82,9 @@ def draw_case(rng: Random, usual: bool = False) -> Case:
     elif not hasattr(BY_NAME["measurement"].kinds.get(kinds.get("measurement"), type(preset.measurement)), "mean_db"):
         while kinds.get("detection") == "threshold":  # it needs levels
             kinds["detection"] = rng.choice(without_files("detection"))
+    measured = BY_NAME["measurement"].kinds.get(kinds.get("measurement"), type(preset.measurement))
+    if usual or not measured().independent:
+        kinds.pop("association", None)  # whose kernels are compiled in other tests, or that it does not suit
     parts = {role: BY_NAME[role].kinds[kind]() for role, kind in kinds.items()}
     preset = replace_parts(preset, parts)
     keywords = kinds | draw_quantities(rng, preset)
@@ -213,7 +216,8 @@ def draw_field(rng: Random, sections: dict[str, Any], keywords: dict[str, Any]) 
 def draw_tracking(rng: Random, sections: dict[str, Any], keywords: dict[str, Any]) -> dict[str, Any]:
     """A tracker that reads what nodes report, and of the filter's quantities those that it makes use of."""
     measurement = sections["measurement"]
-    able = [name for name in TRACKERS if reads(name, measurement)]
+    named = sections["association"].names_targets
+    able = [name for name in TRACKERS if reads(name, measurement)] if named else ["particle"]
     tracker = sections["tracking"].tracker
     if tracker not in able or rng.random() < 0.6:
         tracker = rng.choice(able)
@@ -230,6 +234,8 @@ def draw_tracking(rng: Random, sections: dict[str, Any], keywords: dict[str, Any
         drawn |= {name: usual[name] for name in ROBUST}
     if measurement.lasting_errors:
         drawn |= dict(search=False, fusion="joint")
+    if not named:
+        drawn |= {"fusion": "joint", "silent_information": False} | {name: usual[name] for name in ROBUST}
     if (keywords | drawn).get("gate_sds") is not None:
         drawn |= dict(fusion="joint", silent_information=False)
     if tracker.startswith("boundary"):
@@ -270,8 +276,10 @@ def draw_faults(rng: Random, sections: dict[str, Any], keywords: dict[str, Any])
         kinds = {name: kind for name, kind in kinds.items() if not (kind.of_sensing or kind().changes_tracks)}
     if keywords.get("ends_outside", sections["scenario"].ends_outside):
         kinds.pop("excursion", None)
+    if not sections["association"].names_targets:
+        kinds = {name: kind for name, kind in kinds.items() if not kind().strikes}
     faults = []
-    for name in rng.sample(sorted(kinds), rng.choice([0, 0, 0, 1, 2, 3])):
+    for name in rng.sample(sorted(kinds), min(rng.choice([0, 0, 0, 1, 2, 3]), len(kinds))):
         own = {item.name for item in fields(kinds[name])}
         drawn = {key: value for key, value in draw_quantities(rng, {name: kinds[name]()}).items() if key in own}
         faults.append(",".join([name, *(f"{key}={value}" for key, value in drawn.items())]))

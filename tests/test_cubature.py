@@ -98,7 +98,7 @@ def corrected(tracker, mean, cov, values, times=1, nodes=NODES):
     """Beliefs of as many rows after one period; `times` counts the measurement more than once."""
     scenario = ring_scenario(filter_q=0.0)
     rows = len(values)
-    state = State.zeros(rows=rows, nodes=8)
+    state = State.zeros(rows=rows, nodes=8, reports=8)
     state.belief.mean[:], state.belief.cov[:] = mean, cov
     state.network.positions[:] = nodes
     state.reports.count[:], state.reports.node[:], state.reports.value[:, :, 0] = 8, np.arange(8), values

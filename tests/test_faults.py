@@ -522,7 +522,7 @@ def weighed(scenario, values, sd_m=3.0):
     """Particles and log weights after one period with reports (n, 2) of as many nodes about the middle."""
     tracker, n = ParticleTracker(scenario), len(values)
     belief = Belief.zeros(rows=1, particles=tracker.particles)
-    network, reports = Network.zeros(rows=1, nodes=n, cells=2), Reports.zeros(rows=1, nodes=n)
+    network, reports = Network.zeros(rows=1, nodes=n, cells=2), Reports.zeros(rows=1, reports=n)
     network.positions[0], network.battery[0] = np.linspace((40, 44), (58, 54), n), 1.0
     belief.row["mean"], belief.row["cov"] = (50, 0, 50, 0), np.diag([sd_m**2, 0.01, sd_m**2, 0.01])
     belief.row["predicted_mean"], belief.row["predicted_cov"] = belief.row["mean"], belief.row["cov"]

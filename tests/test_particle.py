@@ -38,7 +38,7 @@ class Filter:
         self.tracker = ParticleTracker(self.scenario, fast=fast)
         particles, self.rows, self.period = self.tracker.particles, rows, 0
         self.keys = np.arange(key, key + rows).astype(np.uint64)
-        self.state = State.zeros(rows=rows, nodes=len(NODES), particles=particles)
+        self.state = State.zeros(rows=rows, nodes=len(NODES), reports=len(NODES), particles=particles)
         self.state.network.positions[:] = NODES
         self.belief = self.state.belief
         self.belief.mean[:], self.belief.cov[:] = start, cov

@@ -8,6 +8,7 @@ from gymnasium.utils.env_checker import check_env
 import wsn_env
 from wsn_env import ClusterVectorEnv, MultiEnv, MultiVectorEnv, Scenario, ScenarioError, View, World, make_policy
 from wsn_env.compiled import draws
+from wsn_env.envs.scarcity import energy_prices
 from wsn_env.evaluation.comparison import evaluate
 from wsn_env.models.state import Cluster
 
@@ -168,6 +169,31 @@ def test_the_evaluation_is_of_what_the_environment_gives():
         assert float(row["rms_m"]) == pytest.approx(np.sqrt((info["episode_rms_m"] ** 2).mean()), rel=1e-12)
         assert float(row["energy_mj"]) * SMALL["periods"] == pytest.approx(info["episode_energy_mj"], rel=1e-12)
         assert float(row["reference_m"]) == pytest.approx(np.sqrt((info["episode_reference_m"] ** 2).mean()), rel=1e-12)
+
+
+def test_greedy_choices_share_nodes_that_cost_energy_while_awake():
+    """Of targets that meet: together they are better than each alone, paired; where being awake is free, the same."""
+    together, alone = "greedy", "greedy:jointly=false"
+    for sensing_nj in (0.0, 100_000.0):
+        scenario = Scenario.named("PreDC-v0", targets=3, motion="meeting", sensing_nj=sensing_nj, particles=200)
+        found = evaluate([together, alone], scenario, 4.0, 60, seed=3)
+        ahead = found.values(together, 4.0, "return") - found.values(alone, 4.0, "return")
+        if sensing_nj == 0.0:
+            assert (ahead == 0).all()
+        else:
+            assert ahead.mean() > 2 * ahead.std() / np.sqrt(len(ahead))
+            saved = found.values(alone, 4.0, "energy_mj") - found.values(together, 4.0, "energy_mj")
+            assert saved.mean() > 2 * saved.std() / np.sqrt(len(saved))
+
+
+def test_scarce_energy_is_that_of_all_targets():
+    """With three targets what is left is a third as long a supply."""
+    supply = []
+    for targets in (1, 3):
+        world = World(Scenario.named("Lifetime-v0", targets=targets, **SMALL))
+        state = world.reset(np.repeat([draws.key_of_seed(4)], targets))
+        supply.append(energy_prices(View.of(state), world.scenario, 1.0, -1.0)[0])
+    assert supply[0] == pytest.approx(3 * supply[1])
 
 
 # --- faces --------------------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from wsn_env import Cluster, Scenario, View, World
 ROWS, PERIODS = 45, 12
 SUCCESSES = (0.3, 0.6, 0.9, 1.0)
 NAMES = ("PreDC-v0", "Rssi-v0", "Binary-v0", "Anchors-v0", "Underwater-v0", "Ble-v0")
+UNNAMED = "PreDC-v0, reports without a name"
 LOSSES_DIFFER = NAMES[:3]  # elsewhere everybody has something to report wherever the target is, or it seldom happens
 
 
@@ -38,7 +39,7 @@ def delivered(scenario, state, outcome, row):
 def differences(one, other, row):
     """Names of what differs in the row's views; of lists only the entries that count."""
     lengths = {"network.members": one.network.n_members[row]}
-    lengths |= dict.fromkeys(("reports.node", "reports.value"), one.reports.count[row])
+    lengths |= dict.fromkeys(("reports.node", "reports.value", "reports.share"), one.reports.count[row])
     found = []
     for (name, ours), (_, theirs) in zip(View.of(one).knowledge.leaves(), View.of(other).knowledge.leaves()):
         seen = (array[row] if name not in lengths else array[row, : lengths[name]] for array in (ours, theirs))
@@ -47,10 +48,11 @@ def differences(one, other, row):
     return found
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", (*NAMES, UNNAMED))
 @pytest.mark.parametrize("success", SUCCESSES)
 def test_what_is_not_delivered_cannot_be_seen(name, success):
-    world, one, other = two_worlds(name, packet_success=success)
+    more = dict(association="unknown", clutter=0.2) if name == UNNAMED else {}
+    world, one, other = two_worlds(name.partition(",")[0], packet_success=success, **more)
     rng, alike, hidden = np.random.default_rng(11), np.ones(ROWS, bool), 0
     nodes = one.residual_j.shape[1]
     for _ in range(PERIODS):

@@ -37,7 +37,7 @@ FAST_MODULES = (  # the filter; the world stays strict
     "wsn_env.filters.kernels",
     "wsn_env.filters.likelihood",
     "wsn_env.filters.resampling",
-    "wsn_env.filters.robust",
+    "wsn_env.models.association.robust",
     "wsn_env.compiled.elementary",
     "wsn_env.compiled.draws",
 )

@@ -40,6 +40,7 @@ EXPECTED = record(
         ("variance", "f8", NUMBERS),  # of its noise
         ("price_m", "f8"),  # what an order of merit charges for it
         ("open", "i8"),  # 1: still to be ordered
+        ("shared", "i8"),  # 1: awake for another target anyhow
     ]
 )
 
@@ -174,7 +175,7 @@ def _expect(start, stop, cs, handle, asked, rows, found):
 
 @lean_piece
 def _expect_node(known, b, node, depth, c, e):
-    e.node = node
+    e.node, e.shared = node, 0
     if node < 0:
         return
     place, m, p = node_of(sensors_of(known, b), node), known.belief[b].predicted_mean, known.belief[b].predicted_cov

@@ -129,6 +129,8 @@ def price_mj(node: Any, outlook: Outlook, leader: int, r: Any) -> float:
     report = node.packets * transmission(r, r.report_bits, squared)
     if r.to_head:
         report += node.packets * reception(r, r.report_bits)
+    if node.shared:
+        return 1e3 * node.detection * report
     return 1e3 * (node.detection * report + r.awake_j - r.asleep_j)
 
 

@@ -44,8 +44,8 @@ def describe_energy(known: Any, b: int, c: Any, f: np.ndarray) -> None:
 
 @lean_piece
 def _typical_mj(row, c):
-    """What a typical schedule spends in the time left [mJ]."""
-    return c.typical_energy_mj * max(c.periods - row.period, 1.0)
+    """What a typical schedule spends in the time left, for all targets [mJ]."""
+    return c.typical_energy_mj * max(c.periods - row.period, 1.0) * max(row.targets, 1)
 
 
 @lean_piece

@@ -36,7 +36,7 @@ from wsn_env.simulation.reference import has_reference
 COLUMNS = (
     "policy scenario lam episode seed periods return error_m rms_m energy_mj members handovers searches lost"
     " first_death half_dead functional tracked stranded_mj stranded_sd"
-    " reference_m reference_all_awake_m anees variance_ratio"
+    " reference_m reference_all_awake_m anees variance_ratio gospa_m swaps lost_tracks"
 ).split()
 Row = dict[str, str | float]  # of the columns in COLUMNS
 MEANS = ("return", "rms_m", "error_m", "energy_mj", "members", "handovers", "searches", "lost", *METRICS)

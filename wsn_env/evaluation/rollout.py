@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wsn_env.compiled import draws
+from wsn_env.evaluation.correspondence import Correspondence
 from wsn_env.evaluation.policies import Policy
 from wsn_env.models.quantity import whole_number
 from wsn_env.models.state import NOBODY, Cluster, Outcome, State
@@ -77,7 +78,8 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
 
     `error_m` is the mean of errors as they count (`Scenario.counted_m`), `rms_m` of errors as they are. How long the
     network lasted is told by `lifetimes`. With several targets errors are means over them, counts, energies and returns
-    sums.
+    sums, and `gospa_m`, `swaps` and `lost_tracks` are those of a Correspondence whose cut-off is the sensing radius;
+    "" with one.
     """
     scenario, targets = world.scenario, world.scenario.targets
     rows = len(seeds) * targets
@@ -88,6 +90,7 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
     reference = Reference(scenario, rows, world.threads) if has_reference(scenario) else None
     begin = None if reference is None else lambda state, _: reference.begin(state)
     playing, played = np.ones(rows, bool), np.zeros(rows, int)
+    followed = Correspondence(len(seeds), targets, scenario.radius_m)
     lives: dict[str, np.ndarray] = dict.fromkeys(METRICS, np.zeros(rows))
     for state, outcome in episodes(policy, world, seeds, begin):
         square, believed = outcome.error_m**2, outcome.posterior_rms_m**2
@@ -112,6 +115,8 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
         playing &= ~left_now
         if reference is not None:
             reference.advance(state, outcome)
+        if targets > 1:
+            followed.note(outcome.estimate_m, outcome.target_m)
     left = scenario.periods - played
     error, energy = (
         sums["error"] + left * scenario.reference_error_m,
@@ -138,6 +143,8 @@ def rollout(policy: Policy, world: World, seeds: Sequence[int]) -> list[dict[str
     }
     if targets > 1:
         columns = {name: OVER_TARGETS[name](each.reshape(-1, targets), axis=1) for name, each in columns.items()}
+    for name in IDENTITY:
+        columns[name] = getattr(followed, name) if targets > 1 else np.full(len(seeds), "")
     return [{name: values[i].item() for name, values in columns.items()} for i in range(len(seeds))]
 
 
@@ -149,6 +156,7 @@ def _shared(values: np.ndarray, axis: int) -> np.ndarray:
     return values[:, -1]
 
 
+IDENTITY = ("gospa_m", "swaps", "lost_tracks")  # of several targets
 OVER_TARGETS: dict[str, Callable[..., np.ndarray]] = {  # how a column of a field is made of those of its targets
     **dict.fromkeys(("return", "sum_error_m", "sum_energy_mj", "energy_mj"), np.sum),
     **dict.fromkeys(("members", "handovers", "searches", "lost"), np.sum),

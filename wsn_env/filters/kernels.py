@@ -16,9 +16,9 @@ from wsn_env.compiled.kernels import kernel, lean_kernel, lean_piece, piece
 from wsn_env.filters.likelihood import weigh_awake
 from wsn_env.filters.modes import allot_modes, inherit_modes, note_modes, predict_by_mode
 from wsn_env.filters.resampling import REACH, correlated, lower_root, resample, spread_copies, spread_copies_alike
-from wsn_env.filters.robust import weigh_robustly
 from wsn_env.filters.walkers import scatter_walkers, walk
-from wsn_env.models.measurement.base import AtHead, weigh_period
+from wsn_env.models.association.base import weigh_reports
+from wsn_env.models.measurement.base import AtHead
 from wsn_env.models.measurement.beacon_levels import draw_biases
 from wsn_env.models.state import belief_at, network_at, reports_at
 
@@ -227,10 +227,7 @@ def filter_row(key: Any, period: int, head: AtHead, c: Any, maps: np.ndarray, sc
         predict_by_mode(draws.stream(key, period, draws.PROCESS), x, belief.modes[b], c.tracking)
     else:
         predict(draws.stream(key, period, draws.PROCESS), x, c.period_s, c.tracking.q)
-    if c.tracking.robust:
-        weigh_robustly(head, c, weights)
-    else:
-        weigh_period(c.measurement, head, c, maps, weights)
+    weigh_reports(c.association, head, c, maps, weights)
     if c.tracking.silent_information:
         weigh_awake(x, log_weights, network, reports.node[b, :count], b, c)
     normalise(log_weights, weights)

@@ -51,6 +51,7 @@ STATE = record(
         ("full_j", "f8"),  # a full battery: a node's energy at the start
         ("log_miss", "f8"),  # log probability of having missed the target ever since the last report
         ("last_search", "i8"),  # period of the last search
+        ("targets", "i8"),  # of its field, whose rows stand one after the other
         ("random_bits", "u4"),  # a random 32-bit number of the period, for policies that want one
     ]
 )
@@ -100,12 +101,17 @@ class Network(Arrays):
 
 @dataclass(frozen=True, eq=False)
 class Reports(Arrays):
-    """What the head received in the last period; the first `count` entries of a row are valid."""
+    """What the head received in the last period; the first `count` entries of a row are valid.
+
+    A node has one entry where reports name their target, else one for each of its measurements, by their first number.
+    """
 
     count: np.ndarray = array(np.int64, "rows")
-    node: np.ndarray = array(np.int32, "rows", "nodes")
-    value: np.ndarray = array(float, "rows", "nodes", 2)  # the two numbers of the measurement's value: x, y [m]; a
+    node: np.ndarray = array(np.int32, "rows", "reports")
+    value: np.ndarray = array(float, "rows", "reports", 2)  # the two numbers of the measurement's value: x, y [m]; a
     # strength and 0; a state, 1 or 0, and 1 if it has changed; the mean level of packets and how many they are
+    share: np.ndarray = array(float, "rows", "unnamed")  # probability that it is of the row's target; (B, 0) where it
+    # says of which it is
     bitmap: np.ndarray = array(np.int8, "rows", "states")  # each node's state as last reported; (B, 0) without states
 
 

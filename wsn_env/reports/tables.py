@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 OVER_REFERENCE = "RMS / reference"
 HEADER = ("policy", "return", "difference to {}", "RMS m", OVER_REFERENCE, "energy mJ/step", "awake", "lost")
 CAPPED = "capped error m"
+IDENTITY = ("GOSPA m", "swaps", "lost tracks")  # of several targets
 LIFETIME = ("first death", "half dead", "functional", "tracked %", "left mJ")
 
 
@@ -27,7 +28,8 @@ def table_header(evaluation: Evaluation, reference: str) -> list[str]:
         names.remove(OVER_REFERENCE)
     if evaluation.scenario.error_cap_m is not None:
         names.insert(names.index("RMS m"), CAPPED)
-    return [*names, *(LIFETIME if nodes_die(evaluation) else ())]
+    several = evaluation.scenario.targets > 1
+    return [*names, *(IDENTITY if several else ()), *(LIFETIME if nodes_die(evaluation) else ())]
 
 
 def nodes_die(evaluation: Evaluation) -> bool:
@@ -66,11 +68,20 @@ def table_rows(evaluation: Evaluation, lam: float, reference: str) -> list[tuple
                     format_interval(s["energy_mj"], 4),
                     f"{s['members'].mean:.1f}",
                     f"{s['lost'].mean:.2f}",
+                    *(_identity(evaluation, policy, lam) if evaluation.scenario.targets > 1 else ()),
                     *(_lifetime(s) if dying else ()),
                 ),
             )
         )
     return [row for _, row in sorted(rows, key=lambda pair: -pair[0])]
+
+
+def _identity(evaluation: Evaluation, policy: str, lam: float) -> list[str]:
+    """The columns of IDENTITY."""
+    gospa, swaps, lost = (
+        Summary.of(evaluation.values(policy, lam, name)) for name in ("gospa_m", "swaps", "lost_tracks")
+    )
+    return [format_interval(gospa, 3), f"{swaps.mean:.2f}", f"{lost.mean:.2f}"]
 
 
 def _lifetime(s: dict[str, Summary]) -> list[str]:

@@ -13,7 +13,7 @@ from wsn_env.models.kinds import constants_type, fill_constants
 from wsn_env.scenario.scenario import Scenario
 from wsn_env.scenario.tracks import CELLS, neighbourhood_m, presence
 
-KINDS = ("measurement", "detection", "radio")
+KINDS = ("measurement", "detection", "radio", "association")
 
 TRACKING = record(
     [
@@ -103,7 +103,7 @@ _types: dict[np.dtype, np.dtype] = {}
 def _constants(scenario: Scenario) -> np.ndarray:
     t = scenario.tracking
     types = [(name, constants_type(getattr(scenario, name), scenario)) for name in KINDS]
-    plain = [(name, "f8") for name in ("period_s", "radius_m", "reach_m", "ring_m")]
+    plain = [(name, "f8") for name in ("period_s", "radius_m", "reach_m", "ring_m", "clutter", "merged_m", "gate_sds")]
     made = _zeros([*types, ("tracking", TRACKING), ("targets", "i8"), *plain])
     for name in KINDS:
         fill_constants(made[name], getattr(scenario, name), scenario)
@@ -139,6 +139,8 @@ def _constants(scenario: Scenario) -> np.ndarray:
     )
     for name, value in tracking.items():
         made["tracking"][name] = value
-    for (name, _), value in zip(plain, (scenario.period_s, scenario.radius_m, scenario.reach_m, scenario.ring_m)):
-        made[name] = value
+    known = scenario.association
+    made["clutter"], made["merged_m"], made["gate_sds"] = known.false_measurements, known.merged_m, known.gate_sds
+    for name in ("period_s", "radius_m", "reach_m", "ring_m"):
+        made[name] = getattr(scenario, name)
     return made

@@ -8,6 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal, TypedDict
 
+from wsn_env.models.association.base import Association
 from wsn_env.models.detection.base import DetectionRule
 from wsn_env.models.fault.base import Fault
 from wsn_env.models.field import Field
@@ -40,6 +41,7 @@ class Quantities(TypedDict, total=False):
     detection: DetectionRule | str
     measurement: Measurement | str
     radio: Link | str
+    association: Association | str
     tracking: Tracking
     faults: tuple[Fault, ...] | list[Fault | str] | Fault | str | None
     # the field
@@ -56,6 +58,7 @@ class Quantities(TypedDict, total=False):
     margin_m: float
     crossing_m: float
     acceleration_ms2: float
+    miss_m: float
     speed_ms: float
     inset_m: float
     spread_m: float
@@ -136,6 +139,10 @@ class Quantities(TypedDict, total=False):
     amplifier_pj_per_bit_m2: float
     rx_nj_per_bit: float
     sensing_nj: float
+    # associations
+    clutter: float
+    resolution_m: float
+    association_sds: float
     # tracking
     tracker: str
     particles: int

@@ -11,12 +11,14 @@ from typing import Any, Unpack, cast
 
 import numpy as np
 
+from wsn_env.models.association.base import Association
+from wsn_env.models.association.known import Known
 from wsn_env.models.detection.base import DetectionRule
 from wsn_env.models.detection.radius import Detection
 from wsn_env.models.fault.base import Fault
 from wsn_env.models.field import Field
 from wsn_env.models.kinds import Kind, Registry
-from wsn_env.models.library import DETECTIONS, FAULTS, MEASUREMENTS, MOTIONS, RADIOS
+from wsn_env.models.library import ASSOCIATIONS, DETECTIONS, FAULTS, MEASUREMENTS, MOTIONS, RADIOS
 from wsn_env.models.measurement.base import Measurement
 from wsn_env.models.measurement.position import Position
 from wsn_env.models.motion.base import Motion
@@ -47,6 +49,7 @@ PARTS: dict[str, type] = {
     "detection": DetectionRule,
     "measurement": Measurement,
     "radio": Link,
+    "association": Association,
     "tracking": Tracking,
 }
 BY_NAME: dict[str, Registry] = {
@@ -54,6 +57,7 @@ BY_NAME: dict[str, Registry] = {
     "detection": DETECTIONS,
     "measurement": MEASUREMENTS,
     "radio": RADIOS,
+    "association": ASSOCIATIONS,
 }
 
 
@@ -109,6 +113,7 @@ class Scenario(Section):
     detection: DetectionRule = Detection()
     measurement: Measurement = Position()
     radio: Link = Radio()
+    association: Association = Known()
     tracking: Tracking = Tracking()
     faults: tuple[Fault, ...] = described((), 'what goes wrong: faults, or text such as "stuck,share=0.1+late"')
 
@@ -127,7 +132,10 @@ class Scenario(Section):
             raise ScenarioError(f"Scenario.unscored = {self.unscored}: must be below periods = {self.periods}")
         if self.ends_outside and self.unscored:
             raise ScenarioError(f"Scenario.unscored = {self.unscored}: must be 0 with ends_outside = True")
-        checked: tuple[Any, ...] = self.tracking, self.detection, self.measurement, self.radio, *self.faults
+        checked: tuple[Any, ...] = (
+            *(self.tracking, self.detection, self.measurement, self.radio, self.association),
+            *self.faults,
+        )
         for part in checked:
             part.check(self)
         self.motion.check_measurement(self.measurement)
@@ -175,7 +183,7 @@ class Scenario(Section):
     @property
     def kinds(self) -> tuple[Kind, ...]:
         """Of everything that there are several kinds of."""
-        return self.motion, self.detection, self.measurement, self.radio, *self.faults
+        return self.motion, self.detection, self.measurement, self.radio, self.association, *self.faults
 
     @property
     def lam_range(self) -> tuple[float, float]:

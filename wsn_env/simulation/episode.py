@@ -104,6 +104,7 @@ def begin(
         network.row[b].n_members = 0
         clear_life(state, b)
         state.sensed[b] = 0
+        row.targets = s.targets
         state.reports.count[b] = 0
         state.reports.bitmap[b] = 0
         belief.surprise = 1.0

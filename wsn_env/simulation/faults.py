@@ -20,6 +20,7 @@ from wsn_env.scenario import Scenario
 
 NOWHERE_M = 1e9  # a target so far away is sensed by nobody
 TRIES = 50  # to sense a target that is not there
+DRAWS = 3 * TRIES  # of random numbers for that
 LONGEST = 1e12  # periods without a turn
 
 
@@ -81,16 +82,35 @@ def what_is_sensed(state: Any, b: int, sensor: Any, asked: bool, target: Any, c:
         x = NOWHERE_M
     if own.false_alarms > 0.0 and not tells(c.measurement, occasion, sensor, x, y, c):
         stream = draws.stream(key, period, draws.FALSE_ALARM)
-        first = sensor.number * (3 * TRIES + 1)
+        first = sensor.number * (DRAWS + 1)
         if draws.uniform(stream, first) < own.false_alarms:
-            for attempt in range(TRIES):  # the first that it detects
-                draw = first + 1 + 3 * attempt
-                other = Occasion(draws.bits(stream, draw), period, asked, period)
-                far = c.radius_m * np.sqrt(draws.uniform(stream, draw + 1))
-                sin, cos = sincos(4.0 * HALF_PI * draws.uniform(stream, draw + 2))
-                if tells(c.measurement, other, sensor, sensor.x + far * cos, sensor.y + far * sin, c):
-                    return other, sensor.x + far * cos, sensor.y + far * sin
+            found, other, false_x, false_y = target_not_there(stream, first + 1, sensor, asked, period, c)
+            if found:
+                return other, false_x, false_y
     return occasion, x, y
+
+
+@lean_piece
+def target_not_there(stream: Any, first: int, sensor: Any, asked: bool, period: int, c: Any) -> Any:
+    """A target that a node senses though it is not there: of uniform points within the sensing radius the first that it
+    detects.
+
+    Args:
+        first: of DRAWS random numbers.
+        sensor: its Node.
+
+    Returns: whether there is one, an Occasion, and where it seems to be (x, y) [m].
+    """
+    occasion, x, y = Occasion(np.uint64(0), period, asked, period), 0.0, 0.0
+    for attempt in range(TRIES):
+        draw = first + 3 * attempt
+        occasion = Occasion(draws.bits(stream, draw), period, asked, period)
+        far = c.radius_m * np.sqrt(draws.uniform(stream, draw + 1))
+        sin, cos = sincos(4.0 * HALF_PI * draws.uniform(stream, draw + 2))
+        x, y = sensor.x + far * cos, sensor.y + far * sin
+        if tells(c.measurement, occasion, sensor, x, y, c):
+            return True, occasion, x, y
+    return False, occasion, x, y
 
 
 @lean_piece

@@ -9,6 +9,7 @@ from wsn_env.compiled.elementary import expected_error
 from wsn_env.compiled.kernels import kernel, lean_kernel, lean_piece
 from wsn_env.filters.kernels import filter_row, make_scratch, redraw_row
 from wsn_env.filters.surprise import note_surprise
+from wsn_env.models.association.base import heard_of_target, nodes_heard
 from wsn_env.models.measurement.base import AtHead, finds_target, log_miss, predict_reports
 from wsn_env.models.motion.modes import predict_mixture
 from wsn_env.models.motion.prediction import predict_moments, predict_walk
@@ -18,7 +19,8 @@ from wsn_env.simulation.faults import fail_nodes
 from wsn_env.simulation.geometry import nearest_living
 from wsn_env.simulation.lifetime import count_dead, count_life
 from wsn_env.simulation.messages import Episode
-from wsn_env.simulation.sensing import is_awake, memory_of, send_late, sense, target_of, wake
+from wsn_env.simulation.sensing import is_awake, send_late, sense, wake
+from wsn_env.simulation.truth import memory_of, target_of
 
 
 @kernel
@@ -47,6 +49,7 @@ def run(
                 redraw_row(key, period, state.belief, b)
             head = AtHead(state.belief, state.network, state.reports, b)
             resampled[b - first] = filter_row(key, period, head, c, maps, scratch)
+            _remember_miss(state, b, c)
         for b in range(first, first + c.targets):
             episode = Episode(state, b, outcomes[b], first, c.targets)
             count += _conclude(resampled[b - first], episode, c.radio, c.tracking)
@@ -76,6 +79,7 @@ def sense_and_report(
         _sense_and_report(
             heads[b], chosen[b], Episode(state, b, outcomes[b], b - b % cs[0].targets, cs[0].targets), cs[0]
         )
+        _remember_miss(state, b, cs[0])
 
 
 @lean_kernel
@@ -119,7 +123,6 @@ def _sense_and_report(head, chosen, episode, c):
         messages.note_residual(head, episode)
     if c.radio.asleep_j > 0.0 and b + 1 == episode.first + episode.targets:
         _sleep(episode, c.radio)
-    _remember_miss(state, b, c)
 
 
 @lean_piece
@@ -208,7 +211,7 @@ def _remember_miss(state, b, c):
     """How improbable the silence since the last report is, seen from the belief."""
     network, belief = state.network, state.belief.row[b]
     head, members = network.row[b].head, network.members[b, : network.row[b].n_members]
-    if finds_target(c.measurement, memory_of(state, b), state.reports.count[b], head, members):
+    if finds_target(c.measurement, memory_of(state, b), heard_of_target(state.reports, b), head, members):
         state.row[b].log_miss = 0.0
     else:
         mean, cov = belief.predicted_mean, belief.predicted_cov
@@ -274,7 +277,7 @@ def _settle(episode, r, t):
     out.posterior_rms_m = np.sqrt(cov[0, 0] + cov[2, 2])
     out.believed_error_m = expected_error(cov[0, 0], cov[0, 2], cov[2, 2])
     out.n_eff = belief.n_eff
-    out.delivered = state.reports.count[b]
+    out.delivered = nodes_heard(state.reports, b)
     out.alive = state.living[b]
     bits = draws.bits(draws.stream(state.key[b], state.row[b].period, draws.POLICY), 0)
     state.row[b].random_bits = np.uint32(bits >> np.uint64(32))

@@ -44,6 +44,9 @@ def why_no_reference(scenario: Scenario) -> str | None:
         why = "a bit that jumps at an edge has no Fisher information"
     elif measurement.lasting_errors:
         why = "the errors of its levels last over periods"
+    elif not scenario.association.names_targets:
+        kind = type(scenario.association).__name__
+        return f"Scenario.association = {kind}: reports do not say of which target they are; allowed is Known"
     elif scenario.ends_outside:
         return "Scenario.ends_outside = True: episodes end before the horizon that the mean is over; allowed is False"
     elif scenario.faults:

@@ -5,13 +5,16 @@ from typing import Any
 import numpy as np
 
 from wsn_env.compiled.kernels import lean_kernel, lean_piece
+from wsn_env.models.association.base import heard_of_target, is_of_target
 from wsn_env.models.measurement.base import node_at, signal, tells
 from wsn_env.models.radio.base import reception
 from wsn_env.models.state import state_at
 from wsn_env.simulation import messages
 from wsn_env.simulation.faults import what_is_sensed
 from wsn_env.simulation.messages import Episode
-from wsn_env.simulation.sensing import is_awake, sense, target_of
+from wsn_env.simulation.sensing import is_awake, sense
+from wsn_env.simulation.truth import target_of
+from wsn_env.simulation.unnamed import best_supported, list_strange, mark_supported
 
 
 @lean_kernel
@@ -32,7 +35,10 @@ def search(
         out.searched = True
         state.row[b].last_search = state.row[b].period
         episode = Episode(state, b, out, b - b % c.targets, c.targets)
-        strongest = _wake_all(episode, rows, c)
+        named = state.reports.share.shape[1] == 0
+        if not named:  # the list is of use from here on
+            state.reports.count[b] = 0
+        strongest = _wake_all(episode, rows, found, c)
         if strongest >= 0:
             # The new head takes over (the velocity is handed to it) and hears the others.
             if c.radio.to_head and messages.take_over(strongest, episode, c.radio):
@@ -44,6 +50,8 @@ def search(
             target = target_of(state, b)
             for node in range(state.network.battery.shape[1]):
                 sense(node, strongest, messages.SEARCH, target, episode, c)
+            if not named:
+                mark_supported(strongest, rows, found, episode, c)
             found[b] = _restart_at_centroid(state, b, c)
             if not found[b]:  # nothing has come: all is as it was
                 state.reports.count[b] = before
@@ -55,11 +63,11 @@ def search(
 
 
 @lean_piece
-def _wake_all(episode, rows, c):
+def _wake_all(episode, rows, found, c):
     """Wake-up call to all, sensing by those that slept.
 
     Args:
-        rows: (B,) bool, which search.
+        rows, found: (B,) bool, which search, and which of them have found theirs.
 
     Returns: the living node with the strongest signal of the target, the first by number where signals are alike; -1:
     nobody detects it.
@@ -69,7 +77,7 @@ def _wake_all(episode, rows, c):
     positions, residual_j, members = network.positions[b], state.residual_j[b], network.members[b]
     target = target_of(state, b)
     call = reception(c.radio, c.radio.wakeup_bits)
-    strongest, best, j = -1, -np.inf, 0
+    reports, strongest, best, j, count = state.reports, -1, -np.inf, 0, 0
     out.members = 0
     for node in range(len(residual_j)):
         while j < standing.n_members and members[j] < node:
@@ -89,22 +97,28 @@ def _wake_all(episode, rows, c):
             continue
         out.members += 1
         sensor = node_at(positions, node)
+        if residual_j[node] > 0.0 and reports.share.shape[1] > 0:
+            count = list_strange(sensor, count, rows, found, episode, c)
+            continue
         occasion, x, y = what_is_sensed(state, b, sensor, True, target, c)
         if residual_j[node] > 0.0 and tells(c.measurement, occasion, sensor, x, y, c):
             strength = signal(c.measurement, occasion, sensor, x, y)
             if strength > best:
                 strongest, best = node, strength
-    return strongest
+    return best_supported(count, episode, c) if reports.share.shape[1] > 0 else strongest
 
 
 @lean_piece
 def _strongest_heard(episode, c):
-    """Of those that a sink has heard the one with the strongest signal, the first by number where signals are alike."""
+    """Of those that a sink has heard of the target the one with the strongest signal, the first by number where signals
+    are alike."""
     state, b = episode.state, episode.b
     target = target_of(state, b)
     strongest, best = np.int64(-1), -np.inf
     for k in range(state.reports.count[b]):
         node: Any = np.int64(state.reports.node[b, k])
+        if not is_of_target(state.reports, b, k):
+            continue
         sensor = node_at(state.network.positions[b], node)
         occasion, x, y = what_is_sensed(state, b, sensor, True, target, c)
         strength = signal(c.measurement, occasion, sensor, x, y)
@@ -115,15 +129,16 @@ def _strongest_heard(episode, c):
 
 @lean_piece
 def _restart_at_centroid(state, b, c):
-    """Position belief about the centroid of the nodes heard, sd r_s / sqrt(n); the velocity's stays. Returns whether
-    any was heard."""
-    heard, positions = state.reports.count[b], state.network.positions[b]
+    """Position belief about the centroid of the nodes heard of the target, sd r_s / sqrt(n); the velocity's stays.
+    Returns whether any was."""
+    reports, positions, heard = state.reports, state.network.positions[b], heard_of_target(state.reports, b)
     if heard == 0:
         return False
     x, y = 0.0, 0.0
-    for k in range(heard):
-        x += positions[state.reports.node[b, k], 0]
-        y += positions[state.reports.node[b, k], 1]
+    for k in range(reports.count[b]):
+        if is_of_target(reports, b, k):
+            x += positions[reports.node[b, k], 0]
+            y += positions[reports.node[b, k], 1]
     mean, cov = state.belief.row[b].mean, state.belief.row[b].cov
     mean[0], mean[2] = x / heard, y / heard
     for axis in (0, 2):

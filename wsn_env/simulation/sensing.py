@@ -5,17 +5,12 @@ from typing import Any
 import numpy as np
 
 from wsn_env.compiled.kernels import lean_piece
-from wsn_env.models.measurement.base import Memory, news, node_at, take_note
+from wsn_env.models.measurement.base import news, node_at, take_note
 from wsn_env.simulation import messages
 from wsn_env.simulation.faults import hold_back, what_is_sensed
 from wsn_env.simulation.messages import Episode
-
-
-@lean_piece
-def target_of(state: Any, b: int) -> tuple[float, float]:
-    """The true position (x, y) in the present period [m]."""
-    k = min(state.row[b].period, state.track.shape[1] - 1)
-    return state.track[b, k, 0], state.track[b, k, 2]
+from wsn_env.simulation.truth import memory_of
+from wsn_env.simulation.unnamed import sense_all
 
 
 @lean_piece
@@ -44,6 +39,9 @@ def sense(node: Any, head: Any, purpose: Any, target: Any, episode: Episode, c: 
     """An awake node's period: it reports what it has to tell, if anything."""
     state, b, out = episode.state, episode.b, episode.out
     if state.residual_j[b, node] <= 0.0:
+        return
+    if state.reports.share.shape[1] > 0:
+        sense_all(node, head, purpose, episode, c)
         return
     sensor = node_at(state.network.positions[b], node)
     occasion, x, y = what_is_sensed(state, b, sensor, purpose == messages.SEARCH, target, c)
@@ -87,10 +85,3 @@ def send_late(head: Any, episode: Episode, c: Any) -> None:
                 reports.value[b, k, 0] = reports.value[b, k - 1, 0]
                 reports.value[b, k, 1] = reports.value[b, k - 1, 1]
             _take_report(slot, node, (own.value[0], own.value[1], own.packets), episode, c)
-
-
-@lean_piece
-def memory_of(state: Any, b: int) -> Any:
-    """What a row's nodes and their head keep of states and packets."""
-    instant = min(state.row[b].period, state.packets.shape[1] - 1)
-    return Memory(state.sensed[b], state.reports.bitmap[b], state.packets[b, instant])

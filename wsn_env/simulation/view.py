@@ -147,7 +147,8 @@ class View:
     @cached_property
     def member(self) -> np.ndarray:
         """(B, S) bool: the standing cluster, head included."""
-        mask = _mask(self.network.members, self.network.n_members)
+        listed = np.arange(self.network.members.shape[1]) < self.network.n_members[:, None]
+        mask = _mask(self.network.members, listed, self.positions.shape[1])
         rows = np.flatnonzero(self.head >= 0)
         mask[rows, self.head[rows]] = True
         return _frozen(mask)
@@ -155,7 +156,7 @@ class View:
     @cached_property
     def detected(self) -> np.ndarray:
         """(B, S) bool: whose reports the head had in the last period, its own included."""
-        return _frozen(_mask(self.reports.node, self.reports.count))
+        return _frozen(_mask(self.reports.node, self._of_target, self.positions.shape[1]))
 
     @cached_property
     def sees(self) -> np.ndarray:
@@ -166,10 +167,16 @@ class View:
         return _frozen((self.reports.bitmap > 0) & (self.member | self.detected))
 
     @cached_property
+    def _of_target(self) -> np.ndarray:
+        """Which of the reports are of the row's target; where they do not say it, probably, at most one a node."""
+        valid = np.arange(self.reports.node.shape[1]) < self.reports.count[:, None]
+        return valid & (self.reports.share >= 0.5) if self.reports.share.shape[1] else valid
+
+    @cached_property
     def measured(self) -> np.ndarray:
         """(B, S, 2): what they reported, zero elsewhere."""
         values = np.zeros(self.positions.shape)
-        rows, slots = np.nonzero(np.arange(self.reports.node.shape[1]) < self.reports.count[:, None])
+        rows, slots = np.nonzero(self._of_target)
         values[rows, self.reports.node[rows, slots]] = self.reports.value[rows, slots]
         return _frozen(values)
 
@@ -250,7 +257,7 @@ class View:
         rows, nodes = a["battery"].shape
         side = Grid.side(nodes)
         of_kinds = {"states": nodes if "bitmap" in a else 0, "receivers": nodes if HEARING[0] in a else 0}
-        known = Knowledge.zeros(rows=rows, nodes=nodes, cells=side * side + 1, **of_kinds)
+        known = Knowledge.zeros(rows=rows, nodes=nodes, reports=nodes, cells=side * side + 1, **of_kinds)
         for name in ("period", "lam", "random_bits", "log_miss", "full_j"):
             known.row[name] = a[name].reshape(rows)
         for name in ("mean", "cov", "predicted_mean", "predicted_cov"):
@@ -284,10 +291,10 @@ def _frozen(array: np.ndarray) -> np.ndarray:
     return array
 
 
-def _mask(nodes: np.ndarray, count: np.ndarray) -> np.ndarray:
-    """(B, S) bool from the first `count` entries of (B, S) indices."""
-    mask = np.zeros(nodes.shape, dtype=bool)
-    rows, slots = np.nonzero(np.arange(nodes.shape[1]) < count[:, None])
+def _mask(nodes: np.ndarray, valid: np.ndarray, count: int) -> np.ndarray:
+    """(B, count) bool from those of (B, n) indices that are valid."""
+    mask = np.zeros((len(nodes), count), dtype=bool)
+    rows, slots = np.nonzero(valid)
     mask[rows, nodes[rows, slots]] = True
     return mask
 

@@ -62,10 +62,13 @@ class World:
         rows, s = whole_number("rows", rows, 0), self.scenario
         if rows % s.targets:
             raise ValueError(f"rows = {rows}: must be a multiple of targets = {s.targets}")
-        nodes = s.field.nodes
-        lengths = dict(rows=rows, nodes=nodes, instants=s.periods + 1, particles=self.tracker.particles)
+        nodes, particles = s.field.nodes, self.tracker.particles
+        reports = nodes * s.association.room_a_node(s.targets)
+        lengths = dict(rows=rows, nodes=nodes, reports=reports, instants=s.periods + 1, particles=particles)
         if s.tracking.switches:
-            lengths["switching"] = self.tracker.particles
+            lengths["switching"] = particles
+        if not s.association.names_targets:
+            lengths["unnamed"] = reports
         if self._faults.any:
             lengths["faulty"] = nodes
         side = Grid.side(nodes)

@@ -1,0 +1,87 @@
+"""What an association has to say: whether reports name their target, and how a head weighs its belief with them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from wsn_env.compiled.kernels import lean_piece
+from wsn_env.models.kinds import Kind, by_kind
+from wsn_env.models.measurement.base import AtHead
+
+if TYPE_CHECKING:
+    from wsn_env.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Association(Kind):
+    """Base of all associations.
+
+    A kind has
+
+        weigh_reports(a, head, c, maps, scratch)
+            Weigh the particles of the row `head.b` with all that its head has heard in a period, in place; of the
+            residual maps and (P,) float32 as a measurement's `weigh_period` has them. `a` holds the kind's constants.
+    """
+
+    abstract: ClassVar[bool] = True
+    role: ClassVar[str] = "association"
+    required: ClassVar[tuple[str, ...]] = ("weigh_reports",)
+    optional: ClassVar[tuple[str, ...]] = ("associate",)
+
+    names_targets: ClassVar[bool] = True  # whether a report says of which target it is
+
+    @property
+    def false_measurements(self) -> float:
+        """Their mean number, for an awake node in a period; here there are none."""
+        return 0.0
+
+    @property
+    def merged_m(self) -> float:
+        """Targets nearer to each other than this are one to a node [m]; here none are."""
+        return 0.0
+
+    @property
+    def gate_sds(self) -> float:
+        """A measurement farther off a target's prediction than so many sds is not of it."""
+        return np.inf
+
+    def room_a_node(self, targets: int) -> int:
+        """How many measurements one node reports at most."""
+        return 1
+
+    def check(self, scenario: Scenario) -> None:
+        """Raise ScenarioError where it does not fit the rest of the scenario."""
+
+
+@by_kind
+def weigh_reports(a: Any, head: AtHead, c: Any, maps: np.ndarray, scratch: Any) -> Any:
+    """Weigh the particles with all that a head has heard in a period, in place."""
+
+
+@lean_piece
+def heard_of_target(reports: Any, b: int) -> int:
+    """How many of a row's reports are of its target, or probably so where they do not say it."""
+    if reports.share.shape[1] == 0:
+        return reports.count[b]
+    count = 0
+    for k in range(reports.count[b]):
+        count += is_of_target(reports, b, k)
+    return count
+
+
+@lean_piece
+def nodes_heard(reports: Any, b: int) -> int:
+    """How many nodes a row's reports are of; a node's measurements stand together."""
+    count = 0
+    for k in range(reports.count[b]):
+        count += k == 0 or reports.node[b, k] != reports.node[b, k - 1]
+    return count
+
+
+@lean_piece
+def is_of_target(reports: Any, b: int, k: int) -> bool:
+    """Whether a row's report number k is of its target, or probably so where it does not say it."""
+    return reports.share.shape[1] == 0 or reports.share[b, k] >= 0.5
