@@ -29,7 +29,7 @@ from wsn_env.reports.plots import draw_comparison
 SEED, PERIODS = 7, 25
 POLICIES = (  # where a policy is at home
     *((name, "PreDC-v0") for name in "pre_dc centroid static_cluster nearest3 adaptive greedy random".split()),
-    *((name, "PreDC-v0") for name in ("planner", "ppo")),
+    *((name, "PreDC-v0") for name in ("planner", "mcts", "ppo")),
     *((name, "Rssi-v0") for name in ("informed3", "adaptive_informed")),
     *((name, "Binary-v0") for name in ("boundary",)),
     *((name, "Underwater-v0") for name in ("strongest_signal",)),

@@ -2,8 +2,8 @@
 
     python -m studies.leaderboard --out out/leaderboard
 
-Writes leaderboard.md; with --references also the returns of the best and of random choices into the package, anew: a
-new version of the benchmark. What was played is kept in the folder, so that a study that was stopped goes on.
+Writes leaderboard.md; with --references also the returns of the best and of random choices in these scenarios into the
+package, anew: a new version of the benchmark. What was played is kept in the folder: a study that was stopped goes on.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 
 import tyro
 
-from wsn_env.envs.registration import IDS
+from wsn_env.envs.registration import STANDARD
 from wsn_env.evaluation import standard
 from wsn_env.evaluation.files import replacing
 from wsn_env.evaluation.policies import make_policy
@@ -34,7 +34,7 @@ POLICIES = (  # those that act in every scenario; the planner would take days
 class Leaderboard:
     """How much is played."""
 
-    scenarios: list[str] = field(default_factory=lambda: list(IDS))
+    scenarios: list[str] = field(default_factory=lambda: list(STANDARD))
     """Which."""
     episodes: int = standard.EPISODES
     """In each, at each trade-off."""
@@ -57,7 +57,8 @@ def main(arguments: list[str] | None = None) -> int:
                 standard.play_standard(fitting, name, asked.episodes, asked.out / name, report),
             )
     if asked.references:
-        told = {evaluation.scenario.name: standard.references_of(evaluation) for evaluation in evaluations}
+        told = json.loads(standard.REFERENCES.read_text(encoding="utf-8"))
+        told |= {standard.standard_name(each.scenario): standard.references_of(each) for each in evaluations}
         with replacing(standard.REFERENCES) as path:
             path.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
         standard.references.cache_clear()

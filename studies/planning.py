@@ -1,4 +1,4 @@
-"""What looking ahead is worth: the planner beside the fixed clusters, and what a decision costs.
+"""What looking ahead is worth: the planner and tree search beside the fixed clusters, and what a decision costs.
 
 python -m studies.planning --scenario Rssi-v0 --episodes 200
 """
@@ -11,6 +11,7 @@ from pathlib import Path
 
 import tyro
 
+from wsn_env.agents.mcts import Mcts
 from wsn_env.agents.planner import Planner
 from wsn_env.agents.ppo import PRETRAINED
 from wsn_env.evaluation.comparison import Evaluation, evaluate
@@ -71,18 +72,22 @@ def main(arguments: list[str] | None = None) -> None:
     """Compare and print."""
     settings = tyro.cli(Comparison, args=arguments)
     scenario = Scenario.named(settings.scenario, **({} if settings.lam is None else {"lam": settings.lam}))
-    planner = Planner(scenario, settings.horizon, settings.worlds)
-    planner.act(View.of(World(scenario).reset([0])))  # compiles and rehearses
+    ahead: dict[str, Policy] = {
+        "planner": Planner(scenario, settings.horizon, settings.worlds),
+        "mcts": Mcts(scenario, settings.horizon, min(settings.worlds, Mcts.worlds)),
+    }
+    for policy in ahead.values():
+        policy.act(View.of(World(scenario).reset([0])))  # compiles and rehearses
     shipped = ["ppo"] * (PRETRAINED / scenario.name).is_dir()
     names = list(dict.fromkeys([*shipped, *settings.against]))
-    policies = {"planner": planner} | {name: make_policy(name, scenario) for name in names}
+    policies = ahead | {name: make_policy(name, scenario) for name in names}
     timed = {name: Timed(policy) for name, policy in policies.items()}
     with progress_bar() as report:
         found = evaluate(timed, scenario, None, settings.episodes, settings.seed, progress=report, threads=1)
     print_tables(found)
     (lam,) = found.lams
     rival = max(settings.against, key=lambda name: found.values(name, lam, "return").mean())
-    text = table(found, lam, ["planner", *shipped, rival], timed)
+    text = table(found, lam, [*ahead, *shipped, rival], timed)
     print(text)
     settings.out.mkdir(parents=True, exist_ok=True)
     with replacing(settings.out / "planning.md") as path:

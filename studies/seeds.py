@@ -27,7 +27,7 @@ from wsn_env.reports.markdown import markdown_table
 from wsn_env.scenario import Scenario
 from wsn_env.scenario.options import make_scenario
 
-SLOW = ("ppo", "planner", "all")
+SLOW = ("ppo", "planner", "mcts", "all")
 
 
 @dataclass

@@ -9,6 +9,7 @@ from tests.test_policies import chosen, walked
 from tests.worlds import assert_same, expected, expected_gain
 from wsn_env import Scenario, View, World, evaluate
 from wsn_env.agents.imagined import GaussianTracker, draw_worlds, imagined_world, place_nodes, take_rows
+from wsn_env.agents.mcts import RULE, Mcts, Node
 from wsn_env.agents.nearest import ORDERS, Nearest
 from wsn_env.agents.planner import Planner
 from wsn_env.compiled import draws
@@ -156,8 +157,8 @@ def test_the_comparison_tells_what_a_decision_costs(tmp_path, capsys):
     asked = f"--episodes 2 --horizon 2 --worlds 4 --lam 2 --against nearest0 nearest1 --out {tmp_path}"
     main(asked.split())
     assert "PreDC-v0, lam = 2 m/mJ" in capsys.readouterr().out
-    head, _, planner, ppo, rival = (tmp_path / "planning.md").read_text().splitlines()
-    assert head.startswith("| PreDC-v0, lam = 2 |") and all(" ms |" in line for line in (planner, ppo, rival))
+    head, _, planner, mcts, ppo, rival = (tmp_path / "planning.md").read_text().splitlines()
+    assert head.startswith("| PreDC-v0, lam = 2 |") and all(" ms |" in line for line in (planner, mcts, ppo, rival))
     assert planner.startswith("| planner | -") and ppo.startswith("| ppo | -") and rival.startswith("| nearest")
 
 
@@ -238,3 +239,39 @@ def test_a_strength_tells_the_gaussian_tracker_what_its_information_says():
         (node,) = expected(RSSI, state.network.positions[row, nodes[row, 2:]], m, p)
         _, *after = expected_gain(node, 1.0, p)
         np.testing.assert_allclose([own["cov"][0, 0], own["cov"][0, 2], own["cov"][2, 2]], after, rtol=1e-9)
+
+
+# --- the tree -------------------------------------------------------------------------------------------------------
+
+FEW = dict(horizon=4, worlds=12, simulations=24)
+
+
+def test_the_tree_is_searched_alike_in_any_batch_and_again():
+    view = View.of(some_rows(rows=3))
+    policy = Mcts(SCENARIO, **FEW)
+    together = clusters(policy.act(view))
+    assert clusters(Mcts(SCENARIO, **FEW).act(view)) == together
+    assert [clusters(policy.act(take_rows(view, slice(row, row + 1))))[0] for row in range(3)] == together
+
+
+def test_the_tree_widens_with_its_visits():
+    """A node visited N times has at most ceil(width N^widening) choices, the rule's own first."""
+    policy = Mcts(SCENARIO, width=2.0, widening=0.5)
+    node, order = Node(list(range(20, -2, -1))), list(range(20, -2, -1))
+    for visits in range(1, 60):
+        choice, child, _ = policy._descend(node, order, 1.0)
+        assert visits > 1 or choice == RULE
+        child.visits, child.cost, node.visits = child.visits + 1, child.cost + choice % 7, visits
+        assert len(node.children) <= np.ceil(2.0 * max(visits - 1, 1) ** 0.5)
+    assert len(node.children) >= 10
+    visited = {choice: child.visits for choice, child in node.children.items()}
+    assert max(visited, key=visited.get) in (0, 7, 14)  # which cost nothing
+
+
+def test_a_tree_does_better_than_its_rule():
+    """A head alone is a poor choice where energy is cheap: paired over 16 short episodes."""
+    scenario = SCENARIO.override(periods=25, lam=0.3)
+    rule = Nearest(scenario, 0)
+    found = evaluate({"tree": Mcts(scenario, rule=rule, width=4.0, **FEW), "rule": rule}, scenario, 0.3, 16, threads=1)
+    ahead = found.values("tree", 0.3, "return") - found.values("rule", 0.3, "return")
+    assert ahead.mean() > 3 * ahead.std() / np.sqrt(len(ahead))

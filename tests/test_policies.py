@@ -46,7 +46,7 @@ def chosen(cluster: Cluster, row: int) -> set[int]:
 
 def test_every_name_is_an_entry_point():
     expected = set("adaptive adaptive_informed greedy informed nearest pre_dc boundary centroid static_cluster".split())
-    expected |= set("strongest_signal strongest quadrants every random all planner ppo".split())
+    expected |= set("strongest_signal strongest quadrants every random all planner mcts ppo".split())
     assert expected <= set(policy_names())
     for name, n, order in (("nearest4", 4, "nearest"), ("informed12", 12, "information")):
         made = make_policy(name, SCENARIO)

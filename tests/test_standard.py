@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from studies import leaderboard
-from wsn_env import Scenario, as_policy, cli, make_policy
-from wsn_env.envs.registration import IDS
+from wsn_env import as_policy, cli, make_policy
+from wsn_env.envs.registration import STANDARD
 from wsn_env.evaluation import standard
 from wsn_env.evaluation.rollout import BLOCK
 from wsn_env.evaluation.standard import EPISODES, Reference, Scores, block_scores, play_standard, references, scores
@@ -21,12 +21,13 @@ def played():
 
 
 def test_the_package_has_references_for_every_scenario_and_trade_off():
-    assert set(references()) == set(IDS)
+    assert set(references()) == set(STANDARD)
     for name, known in references().items():
-        assert set(known) == set(standard.standard_lams(Scenario.named(name)))
+        scenario = standard.standard_scenario(name)
+        assert set(known) == set(standard.standard_lams(scenario)) and standard.standard_name(scenario) == name
         for reference in known.values():
             assert reference.best_returns.shape == (EPISODES // BLOCK,) and reference.span > 0
-            make_policy(reference.best, name)
+            make_policy(reference.best, scenario)
 
 
 def test_the_references_are_what_the_policies_play(played):

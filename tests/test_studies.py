@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from studies import ablations, faults, lifetime, particles, seeds, tables, targets, worlds
+from studies import ablations, association, faults, lifetime, particles, seeds, tables, targets, worlds
 from studies.report import draw_curves, learning_curve, over_seeds, table
 from tests.figures import check_tables
 from wsn_env import Scenario
@@ -167,6 +167,12 @@ def test_particles(tmp_path, capsys):
     assert particles.main(["--episodes", "40", "--out", str(tmp_path)]) == 0
     assert (tmp_path / "particles.md").read_text().strip() in capsys.readouterr().out
     check_tables("filters.md", "particles", tmp_path, share=40 / 500)
+
+
+def test_association_in_short(tmp_path, capsys):
+    assert association.main(["--episodes", "40", "--no-stone-soup", "--out", str(tmp_path)]) == 0
+    assert (tmp_path / "meeting.md").read_text() in capsys.readouterr().out
+    check_tables("targets.md", "association", tmp_path, share=40 / 500)
 
 
 def test_several_targets_in_short(tmp_path, capsys):

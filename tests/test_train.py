@@ -158,9 +158,16 @@ def test_a_stopped_training_ends_as_one_that_was_never_stopped(run, tmp_path, mo
     assert json.loads((tmp_path / "short" / "policy.json").read_text())["training"]["steps"] == 4096
 
 
-def test_so_does_one_with_episodes_of_several_lengths_that_end_outside(tmp_path, monkeypatch):
-    world = ["particles=50", "nodes=40", "side_m=40", "crossing_m=20", "periods=10", "ends_outside=True"]
-    settings = dict(name="short", action="subset", network="flat", set=world, vary=["nodes=30,periods=7"])
+@pytest.mark.parametrize(
+    ("own", "other"),
+    [
+        ("ends_outside=True", "nodes=30,periods=7"),  # episodes of several lengths, that end outside
+        ("targets=2", "targets=3,periods=7,association=unknown,clutter=0.2"),  # in fields of several targets
+    ],
+)
+def test_so_does_one_in_unequal_worlds(tmp_path, monkeypatch, own, other):
+    world = ["particles=50", "nodes=40", "side_m=40", "crossing_m=20", "periods=10", own]
+    settings = dict(name="short", action="subset", network="flat", set=world, vary=[other])
     settings |= dict(steps=1536, rows=16, rollout=16, batch=128, epochs=2, episodes=0, checkpoint_steps=512)
     train.train(train.Training(**settings, runs=tmp_path / "whole"))
     train_until(monkeypatch, 1, **settings, runs=tmp_path / "stopped")

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from wsn_env.envs.registration import IDS
+from wsn_env.envs.registration import STANDARD
 from wsn_env.evaluation.files import alone_in
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.evaluation.rollout import Engine
@@ -70,7 +70,7 @@ class Benchmark:
 
     policy: list[str]
     """Policies, as for evaluate."""
-    scenarios: list[str] = field(default_factory=lambda: list(IDS))
+    scenarios: list[str] = field(default_factory=lambda: list(STANDARD))
     """Which; an aggregate is of all."""
     episodes: int = 1000
     """How many of the 1,000, a multiple of 50: for a first look."""

@@ -18,6 +18,7 @@ ROWS = 64
 
 def single() -> Callable[[], None]:
     """A step of a single environment, which is reset at its episodes' ends."""
+    ClusterEnv(SMALL.override(start="search")).reset(seed=0)  # else its code would be loaded when first a track is lost
     env, rng = ClusterEnv(SMALL, action="menu", observation="menu"), np.random.default_rng(0)
     env.reset(seed=0)
 

@@ -12,6 +12,7 @@ PRESETS = Path(__file__).parents[1] / "scenario" / "presets"
 
 IDS = tuple(sorted(path.stem.replace("_", "-") for path in PRESETS.glob("*_v*.py")))  # without importing them
 MULTI = "wsn_env/Multi-v0"
+STANDARD = *IDS, MULTI.removeprefix("wsn_env/")  # what the standard benchmark plays
 CONTINUOUS = {f"{name.rpartition('-')[0]}Continuous-{name.rpartition('-')[2]}": name for name in IDS}
 
 

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from wsn_env.envs.multi_env import TargetRows
 from wsn_env.envs.scarcity import energy_prices
-from wsn_env.envs.vector_env import ClusterVectorEnv
 from wsn_env.models.quantity import check_quantity
 from wsn_env.simulation.view import View
 
 
-class PricedVectorEnv(ClusterVectorEnv):
+class PricedVectorEnv(TargetRows):
     """The native vector environment with another lam in every period: `energy_prices` at the episode's own.
 
     Thousands of periods lie between spending and its consequence, too many for a discounted return; a price brings it
@@ -21,7 +21,7 @@ class PricedVectorEnv(ClusterVectorEnv):
 
     Args:
         steering: of the price.
-        The rest: as ClusterVectorEnv, of a scenario with `scarce_energy`; lam is the price where there is just what is
+        The rest: as TargetRows, of a scenario with `scarce_energy`; lam is the price where there is just what is
             typical.
     """
 

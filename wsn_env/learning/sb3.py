@@ -13,6 +13,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
 from wsn_env.evaluation.native_envs import unwrap_native
+from wsn_env.scenario import Scenario
 
 
 class SB3VecEnv(VecEnv):
@@ -37,17 +38,13 @@ class SB3VecEnv(VecEnv):
             raise ValueError("reward 'vector': stable-baselines3 learns from one number, use 'error' or 'belief'")
         if stagger and self._mode != AutoresetMode.DISABLED:
             raise ValueError("stagger=True needs autoreset_mode Disabled")
-        if stagger and getattr(self._native, "takes_several_targets", False):
-            raise ValueError("stagger=True: the targets of a field end together")
         self.envs = envs
         self.seconds: float = 0.0  # wall time spent in step and reset
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
         self._parts = [part.unwrapped for part in getattr(self._native, "parts", [envs])]
         self._first_end = np.full(envs.num_envs, -1)
         if stagger:
-            parts = self._parts
-            ends = [1 + np.arange(part.num_envs) * part.scenario.periods // part.num_envs for part in parts]
-            self._first_end = np.concatenate(ends)
+            self._first_end = np.concatenate([_staggered(part.num_envs, part.scenario) for part in self._parts])
         self._steps = 0
 
     def reset(self) -> VecEnvObs:
@@ -165,6 +162,12 @@ class SB3VecEnv(VecEnv):
         """Frames of all rows."""
         frames: Any = self.envs.render()
         return frames
+
+
+def _staggered(rows: int, scenario: Scenario) -> np.ndarray:
+    """(B,) the periods in which the first episodes end, evenly spread; the targets of a field end together."""
+    targets = scenario.targets
+    return np.repeat(1 + np.arange(rows // targets) * scenario.periods // (rows // targets), targets)
 
 
 def _copy_row(arrays: VecEnvObs, i: int) -> Any:

@@ -151,8 +151,8 @@ class Scenario(Section):
         """Raise ScenarioError where there are several."""
         if self.targets > 1:
             raise ScenarioError(
-                f"Scenario.targets = {self.targets}: must be 1 for {of_what}; several are for evaluate, replay and"
-                " gym.make('wsn_env/Multi-v0', targets=...)"
+                f"Scenario.targets = {self.targets}: must be 1 for {of_what}; several are for evaluate, replay, train"
+                " and gym.make('wsn_env/Multi-v0', targets=...)"
             )
 
     def _check_several_targets(self) -> None:

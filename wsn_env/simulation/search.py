@@ -14,7 +14,7 @@ from wsn_env.simulation.faults import what_is_sensed
 from wsn_env.simulation.messages import Episode
 from wsn_env.simulation.sensing import is_awake, sense
 from wsn_env.simulation.truth import target_of
-from wsn_env.simulation.unnamed import best_supported, list_strange, mark_supported
+from wsn_env.simulation.unnamed_search import best_supported, list_strange, mark_supported
 
 
 @lean_kernel

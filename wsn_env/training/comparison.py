@@ -17,7 +17,7 @@ from wsn_env.training.settings import Training, trade_offs
 
 SIZED = ("nearest", "informed")  # compared with each of SIZES
 SIZES = range(9)  # further members
-SLOW = ("ppo", "planner")  # left out: the one trained is in it, the other takes hours
+SLOW = ("ppo", "planner", "mcts")  # left out: the one trained is in it, the others take hours
 
 
 def make_baselines(scenario: Scenario) -> dict[str, Policy]:

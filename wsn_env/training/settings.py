@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal, get_args, get_origin, get_type_hints
 
 from wsn_env.evaluation.rollout import FIRST_SEED, evaluation_seeds
-from wsn_env.learning.worlds import default_worlds
+from wsn_env.learning.worlds import default_worlds, world_of
 from wsn_env.models.measurement.base import Order
 from wsn_env.models.quantity import check_quantity
 from wsn_env.scenario import Scenario
@@ -122,7 +122,6 @@ def complete_settings(settings: Training) -> Scenario:
     if settings.tracks and Scenario.named(settings.scenario).measurement.lasting_errors:
         raise ValueError(f"Training.tracks: {settings.scenario} is trained in its simulated form; wsn evaluate replays")
     scenario = make_scenario(settings.scenario, settings.set, settings.tracks)
-    scenario.check_one_target("a training")
     settings.lam = settings.lam or list(scenario.lam_span)
     if len(settings.lam) > 2:
         raise ValueError(f"Training.lam = {settings.lam}: must be one number, or two that it is drawn between")
@@ -142,7 +141,7 @@ def complete_settings(settings: Training) -> Scenario:
     return scenario.override(lam=low if len(settings.lam) == 1 else (low, high))
 
 
-def check_settings(settings: Training) -> None:
+def check_settings(settings: Training, scenario: Scenario) -> None:
     """Refuse now what would fail after the training."""
     for name in "steps rows rollout batch epochs torch_threads checkpoint_steps".split():
         check_quantity("Training", name, getattr(settings, name), at_least=1, whole=True)
@@ -168,11 +167,16 @@ def check_settings(settings: Training) -> None:
         raise ValueError(f"Training.network = {settings.network!r}: the engine ray trains only 'entries'")
     if settings.engine == "ray" and settings.even_worlds:
         raise ValueError("Training.even_worlds = True: must be False with --engine ray")
+    if settings.engine == "ray":
+        scenario.check_one_target("a training with --engine ray")
     shares = 1 if settings.engine == "local" else max(1, settings.runners)
-    others = len(settings.vary or ())
-    if settings.rows // shares <= others:
-        least = shares * (others + 1)
-        raise ValueError(f"Training.rows = {settings.rows}: must be at least {least}, one a scenario and runner")
+    worlds = [scenario, *(scenario.override(**world_of(text)) for text in settings.vary or ())]
+    targets = max(world.targets for world in worlds)
+    least = shares * len(worlds) * targets
+    if settings.rows < least:
+        raise ValueError(
+            f"Training.rows = {settings.rows}: must be at least {least}, one a scenario, target and runner"
+        )
     if settings.address and settings.engine != "ray":
         raise ValueError(f"Training.address = {settings.address!r}: must be left out but with --engine ray")
     # Every seed that training may use lies below those of evaluations.

@@ -21,8 +21,8 @@ from stable_baselines3.common.utils import LinearSchedule
 from wsn_env.agents.budget import find_price
 from wsn_env.agents.ppo import PRICE, PPOPolicy, save_policy
 from wsn_env.envs.interface import Settings
+from wsn_env.envs.multi_env import TargetRows
 from wsn_env.envs.observations import ObservationName
-from wsn_env.envs.vector_env import ClusterVectorEnv
 from wsn_env.evaluation.policies import make_policy
 from wsn_env.evaluation.progress import progress_bar
 from wsn_env.evaluation.versions import versions
@@ -54,7 +54,7 @@ def train(settings: Training) -> None:
     for name, value in check_parameters(Training, vars(settings), "Training.").items():
         setattr(settings, name, value)
     scenario = complete_settings(settings)
-    check_settings(settings)
+    check_settings(settings, scenario)
     rules = make_baselines(scenario) if settings.episodes else {}
     torch.set_num_threads(settings.torch_threads)
     observation: ObservationName = "menu" if settings.action == "menu" else "candidates"
@@ -158,15 +158,15 @@ def learn_on_ray(settings: Training, scenario: Scenario, interface: Settings, fo
 
 
 def make_envs(settings: Training, scenario: Scenario, interface: Settings, rows: int) -> ConcatVectorEnv:
-    """The rows, divided among the scenarios."""
+    """The rows, divided among the scenarios; in whole fields, where these have several targets."""
     scenarios = [scenario, *(scenario.override(**world_of(text)) for text in settings.vary or ())]
     shares = np.diff(np.arange(len(scenarios) + 1) * rows // len(scenarios))
     parts = []
     for place, (one, share) in enumerate(zip(scenarios, shares)):
-        rows_of: Callable[..., ClusterVectorEnv] = ClusterVectorEnv
+        rows_of: Callable[..., TargetRows] = TargetRows
         if settings.steering:
             rows_of = partial(PricedVectorEnv, steering=settings.steering)
-        envs = rows_of(int(share), one, autoreset_mode="Disabled", **asdict(interface))
+        envs = rows_of(int(share // one.targets * one.targets), one, autoreset_mode="Disabled", **asdict(interface))
         told = PrivilegedVectorEnv(envs, place, len(scenarios)) if settings.privileged else envs
         parts.append(TrainingReward(told, calibrated=settings.reward == "belief"))
     return ConcatVectorEnv(parts)
