@@ -58,8 +58,9 @@ class Planner(ViewPolicy):
 
     def __post_init__(self) -> None:
         if self.scenario.measurement.lasting_errors:
-            kind = type(self.scenario.measurement).__name__
-            raise ValueError(f"Scenario.measurement = {kind}: planner cannot draw errors that last; allowed are others")
+            kind, name = type(self.scenario.measurement).__name__, type(self).__name__.lower()
+            why = f"{name} cannot draw errors that last; allowed are others"
+            raise ValueError(f"Scenario.measurement = {kind}: {why}")
         check_quantity("Planner", "horizon", self.horizon, at_least=1, whole=True)
         check_quantity("Planner", "worlds", self.worlds, at_least=4, whole=True)
         check_quantity("Planner", "doubt", self.doubt, at_least=0)

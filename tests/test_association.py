@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from datetime import datetime
-from itertools import product
+from itertools import permutations, product
 
 import gymnasium as gym
 import numpy as np
@@ -12,12 +12,15 @@ from numba import njit
 from wsn_env import Cluster, Scenario, ScenarioError, View, World, evaluate, make_policy
 from wsn_env.compiled import draws
 from wsn_env.evaluation.correspondence import Correspondence
-from wsn_env.models.association.base import Association
+from wsn_env.models.association.base import Association, heard_of_target
 from wsn_env.models.association.events import weights_of_others
 from wsn_env.models.association.fit import false_density
 from wsn_env.models.association.unknown import Unknown
 from wsn_env.models.measurement.base import node_at
+from wsn_env.models.state import Reports, reports_at, state_at
 from wsn_env.scenario.constants import constants
+from wsn_env.simulation.messages import Episode
+from wsn_env.simulation.unnamed import sensed_thing
 
 SMALL = dict(particles=300, periods=30)
 CONFUSED = dict(association="unknown", clutter=0.3, **SMALL)
@@ -141,10 +144,15 @@ def test_the_density_of_false_measurements_is_one(measurement):
 
 
 @pytest.mark.parametrize("association", ["unknown", "nearest"])
-def test_one_target_without_clutter_is_as_known_to_the_bit(association):
-    """Nothing else can have made a report."""
+@pytest.mark.parametrize(
+    "more",
+    [{}, dict(search_miss=0.9, search_gap=3), dict(start="search", receiver="sink", packet_success=0.4)],
+    ids=str,
+)
+def test_one_target_without_clutter_is_as_known_to_the_bit(association, more):
+    """Nothing else can have made a report; nor after a search."""
     (*_, (one, _)), (*_, (other, _)) = (
-        play(Scenario.named("PreDC-v0", association=each, **SMALL)) for each in ("known", association)
+        play(Scenario.named("PreDC-v0", association=each, **SMALL, **more)) for each in ("known", association)
     )
     for (name, ours), (_, theirs) in zip(one.belief.leaves(), other.belief.leaves(), strict=True):
         assert (ours == theirs).all(), name
@@ -207,6 +215,25 @@ def test_clutter_is_poissons():
     assert abs(counts.var() - mean) < 4 * np.sqrt((mean + 2 * mean**2) / counts.size)
 
 
+@njit
+def _joined(targets, cs, handle, found):
+    state = state_at(handle)
+    for k in range(targets):
+        sensor, episode = node_at(state.network.positions[0], 0), Episode(state, 0, 0, 0, targets)
+        found[k] = sensed_thing(k, sensor, False, episode, cs[0])[0]
+
+
+@pytest.mark.parametrize("order", list(permutations((0.0, 2.0, 4.0))), ids=str)
+def test_a_chain_of_near_targets_is_one_whatever_their_numbers(order):
+    scenario = Scenario.named("PreDC-v0", targets=4, association="unknown", resolution_m=3.0, **SMALL)
+    world = World(scenario)
+    state = world.reset(keys(1, 4))
+    state.track[:, :, 0], state.track[:, :, 2] = np.array([*order, 9.0])[:, None], 50.0
+    found = np.zeros(4, bool)
+    _joined(4, constants(scenario), state.handle, found)
+    assert found.tolist() == [True, False, False, True]
+
+
 def test_targets_too_near_to_each_other_are_one():
     """Within the resolution a node makes one measurement, about their middle; beyond it two."""
     found = {}
@@ -244,13 +271,16 @@ def test_views_have_what_is_probably_the_targets():
         assert view.detected.shape == state.network.battery.shape
         for b in range(8):
             n = state.reports.count[b]
-            own = share[b, :n] >= 0.5
-            assert np.flatnonzero(view.detected[b]).tolist() == state.reports.node[b, :n][own].tolist()
-            assert (view.measured[b, state.reports.node[b, :n][own]] == state.reports.value[b, :n][own]).all()
-            others += (~own).sum()
+            nodes, values = state.reports.node[b, :n], state.reports.value[b, :n]
+            heard = [node for node in sorted(set(nodes.tolist())) if share[b, :n][nodes == node].sum() >= 0.5]
+            assert np.flatnonzero(view.detected[b]).tolist() == heard
+            for node in heard:
+                likeliest = share[b, :n][nodes == node].argmax()
+                assert (view.measured[b, node] == values[nodes == node][likeliest]).all()
+            others += n - len(heard)
     assert others > 50
-    arrays = view.as_arrays()
-    assert (View.from_arrays(arrays).detected == view.detected).all()
+    again = View.from_arrays(view.as_arrays())
+    assert (again.detected == view.detected).all() and (again.row["targets"] == 2).all()
 
 
 # --- what heads make of it ------------------------------------------------------------------------------------
@@ -270,9 +300,32 @@ def test_joint_association_keeps_tracks_that_the_nearest_neighbour_loses():
     assert lost["known"].sum() == 0 and lost["unknown"].mean() < 0.3 < lost["nearest"].mean()
 
 
-def test_a_search_finds_a_lost_target_among_others_and_clutter():
+@njit
+def _heard(handle, b):
+    return heard_of_target(reports_at(handle), b)
+
+
+@pytest.mark.parametrize(
+    ("nodes", "shares", "heard"),
+    [
+        ([4, 4], [0.3, 0.3], 1),  # one of both, whichever it is
+        ([4, 9], [0.3, 0.3], 1),  # 1 - 0.7 * 0.7 = 0.51
+        ([4, 9], [0.2, 0.2], 0),
+        ([4], [0.5], 1),
+        ([], [], 0),
+    ],
+)
+def test_a_target_is_heard_if_any_node_has_probably_measured_it(nodes, shares, heard):
+    reports = Reports.zeros(rows=1, reports=5, unnamed=5)
+    n = reports.count[0] = len(nodes)
+    reports.node[0, :n], reports.share[0, :n] = nodes, shares
+    assert _heard(reports.handle, 0) == heard
+
+
+@pytest.mark.parametrize("receiver", ["head", "sink"])
+def test_a_search_finds_a_lost_target_among_others_and_clutter(receiver):
     """Its estimate is put far away: after a search it is near its target, not near another or near clutter."""
-    scenario = Scenario.named("PreDC-v0", targets=3, **(CONFUSED | dict(clutter=0.05)))
+    scenario = Scenario.named("PreDC-v0", targets=3, receiver=receiver, **(CONFUSED | dict(clutter=0.05)))
     world, chooser = World(scenario), make_policy("nearest3", scenario)
     state = world.reset(keys(40, 3))
     for _ in range(5):
@@ -286,6 +339,14 @@ def test_a_search_finds_a_lost_target_among_others_and_clutter():
     world.tracker.relocate(state.key, state.period.copy(), lost, state.belief)
     state, outcome = world.step(state, chooser.act(View.of(state)))
     assert outcome.searched[lost].all()
+    for b in np.flatnonzero(lost):
+        n = state.reports.count[b]
+        assert set(state.reports.share[b, :n]) <= {0.0, 1.0}
+        own = state.reports.node[b, :n][state.reports.share[b, :n] == 1.0]
+        if receiver == "sink" and len(own):  # which knows what it has heard
+            apart = np.linalg.norm(state.network.positions[b, own] - state.belief.mean[b, ::2], axis=1)
+            assert apart[own == state.network.head[b]] == pytest.approx(apart.min())
+        assert np.bincount(state.reports.node[b, :n], weights=state.reports.share[b, :n]).max(initial=0.0) <= 1.0
     error = outcome.error_m[lost]
     assert np.median(error) < 5.0 and (error < scenario.radius_m).mean() > 0.75
     assert (outcome.error_m[~lost] < 5.0).mean() > 0.95
@@ -313,12 +374,12 @@ def test_an_association_of_ones_own():
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        (dict(scenario="Binary-v0"), "measurement = Binary: allowed are reports of the target alone"),
-        (dict(faults="stuck"), "faults: allowed are those of the motion"),
+        (dict(scenario="Binary-v0"), "measurement = Binary: allowed are reports of a position or a strength"),
+        (dict(faults="stuck"), "faults = .*: allowed are those of the motion"),
         (dict(tracker="ekf"), "tracker = 'ekf': allowed is 'particle'"),
         (dict(fusion="pooled"), "fusion = 'pooled': allowed is 'joint'"),
         (dict(silent_information=True), "silent_information = True: allowed is False"),
-        (dict(gate_sds=3.0), "gate_sds, outlier_share, node_sd_m: allowed are None, 0, 0"),
+        (dict(gate_sds=3.0), "gate_sds, outlier_share, node_sd_m = 3.0, 0.0, 0.0: allowed are None, 0, 0"),
         (dict(targets=9), "targets = 9: allowed are up to 8"),
         (dict(association="guessed"), "guessed"),
         (dict(clutter=-1.0), r"clutter = -1.0: must be"),

@@ -22,6 +22,7 @@ from wsn_env.simulation.view import View
 
 AHEAD = 3.0  # periods
 NUMBERS = 2  # of a report, at most
+LEAST_DETECTION = 0.05  # with which clutter is shared out: a list is sent whatever is in it
 
 EXPECTED = record(
     [
@@ -185,7 +186,7 @@ def _expect_node(known, b, node, depth, c, e):
         target = PositionBelief(m[0], m[2], p[0, 0], p[0, 2], p[2, 2])
         e.detection = chance(c.measurement, place, target, c)
         e.silence_informs = known.reports.bitmap.shape[1] > 0
-        e.packets = packets_a_report(c.measurement)
+        e.packets = packets_a_report(c.measurement) + c.clutter / max(e.detection, LEAST_DETECTION)
         lines = linearise(c.measurement, place, target)
         e.numbers = min(len(lines), NUMBERS)
         for k in range(e.numbers):

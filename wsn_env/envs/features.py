@@ -10,7 +10,7 @@ from wsn_env.envs.expectations import Outlook
 from wsn_env.envs.feature import BOUND, Feature, amount, flag, share
 from wsn_env.envs.merit import gain, position_cov, squared_between
 from wsn_env.envs.scarcity import ENERGY_FEATURES, describe_energy
-from wsn_env.models.association.base import heard_of_target
+from wsn_env.models.association.base import expected_reports
 from wsn_env.models.motion.modes import COUNT, MODES
 from wsn_env.scenario import Scenario
 
@@ -71,7 +71,7 @@ class Heading(NamedTuple):
 
 
 @lean_piece
-def describe_belief(outlook: Outlook, row: Any, reports: int, radius_m: float, f: np.ndarray) -> Heading:
+def describe_belief(outlook: Outlook, row: Any, reports: float, radius_m: float, f: np.ndarray) -> Heading:
     """Fill f with BELIEF_FEATURES of a row.
 
     Args:
@@ -111,7 +111,7 @@ def describe_row(known: Any, b: int, outlook: Outlook, c: Any, f: np.ndarray) ->
 
     Returns: the direction of the predicted velocity, and how many features they are.
     """
-    belief, heard, end = known.belief[b], heard_of_target(known.reports, b), G + 1 + COUNT
+    belief, heard, end = known.belief[b], expected_reports(known.reports, b), G + 1 + COUNT
     heading = describe_belief(outlook, known.row[b], heard, c.radius_m, f[:G])
     f[G] = 0.5 * log(max(belief.surprise, LEAST_SURPRISE))
     for k in range(COUNT):

@@ -300,6 +300,7 @@ class ViewObservation:
             }
             | (self._of_receivers(box, nodes, far) if scenario.measurement.lasting_errors else {})
             | ({"bitmap": spaces.Box(0, 1, (nodes,), np.int8)} if scenario.measurement.reports_state else {})
+            | ({"targets": spaces.Box(1, scenario.targets, (1,), np.int64)} if scenario.targets > 1 else {})
         )
 
     @staticmethod

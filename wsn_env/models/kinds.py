@@ -58,8 +58,9 @@ class Kind(Section):
         """Raise ScenarioError unless the kind has every function that its role requires."""
         for name in self.required:
             if not callable(getattr(type(self), name, None)):
+                a_role = f"{'an' if self.role[0] in 'aeiou' else 'a'} {self.role}"
                 raise ScenarioError(
-                    f"{type(self).__name__} has no {name}(...): a {self.role} must have {', '.join(self.required)}"
+                    f"{type(self).__name__} has no {name}(...): {a_role} must have {', '.join(self.required)}"
                 )
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from wsn_env.compiled.kernels import lean_kernel, lean_piece
-from wsn_env.models.association.base import heard_of_target, is_of_target
+from wsn_env.models.association.base import is_of_target
 from wsn_env.models.measurement.base import node_at, signal, tells
 from wsn_env.models.radio.base import reception
 from wsn_env.models.state import state_at
@@ -14,7 +14,8 @@ from wsn_env.simulation.faults import what_is_sensed
 from wsn_env.simulation.messages import Episode
 from wsn_env.simulation.sensing import is_awake, sense
 from wsn_env.simulation.truth import target_of
-from wsn_env.simulation.unnamed_search import best_supported, list_strange, mark_supported
+from wsn_env.simulation.unnamed import in_doubt
+from wsn_env.simulation.unnamed_search import best_supported, list_strange, mark_supported, nearest_of_target
 
 
 @lean_kernel
@@ -35,8 +36,8 @@ def search(
         out.searched = True
         state.row[b].last_search = state.row[b].period
         episode = Episode(state, b, out, b - b % c.targets, c.targets)
-        named = state.reports.share.shape[1] == 0
-        if not named:  # the list is of use from here on
+        strange = in_doubt(episode, c)
+        if strange:  # the list is of use from here on
             state.reports.count[b] = 0
         strongest = _wake_all(episode, rows, found, c)
         if strongest >= 0:
@@ -50,13 +51,14 @@ def search(
             target = target_of(state, b)
             for node in range(state.network.battery.shape[1]):
                 sense(node, strongest, messages.SEARCH, target, episode, c)
-            if not named:
+            if strange:
                 mark_supported(strongest, rows, found, episode, c)
             found[b] = _restart_at_centroid(state, b, c)
             if not found[b]:  # nothing has come: all is as it was
                 state.reports.count[b] = before
             elif not c.radio.to_head:
-                messages.take_over(_strongest_heard(episode, c), episode, c.radio)
+                leader = nearest_of_target(episode) if strange else _strongest_heard(episode, c)
+                messages.take_over(leader, episode, c.radio)
         else:  # asked, all keep silent
             state.sensed[b] = 0
             state.reports.bitmap[b] = 0
@@ -77,7 +79,7 @@ def _wake_all(episode, rows, found, c):
     positions, residual_j, members = network.positions[b], state.residual_j[b], network.members[b]
     target = target_of(state, b)
     call = reception(c.radio, c.radio.wakeup_bits)
-    reports, strongest, best, j, count = state.reports, -1, -np.inf, 0, 0
+    strange, strongest, best, j, count = in_doubt(episode, c), -1, -np.inf, 0, 0
     out.members = 0
     for node in range(len(residual_j)):
         while j < standing.n_members and members[j] < node:
@@ -97,7 +99,7 @@ def _wake_all(episode, rows, found, c):
             continue
         out.members += 1
         sensor = node_at(positions, node)
-        if residual_j[node] > 0.0 and reports.share.shape[1] > 0:
+        if residual_j[node] > 0.0 and strange:
             count = list_strange(sensor, count, rows, found, episode, c)
             continue
         occasion, x, y = what_is_sensed(state, b, sensor, True, target, c)
@@ -105,20 +107,17 @@ def _wake_all(episode, rows, found, c):
             strength = signal(c.measurement, occasion, sensor, x, y)
             if strength > best:
                 strongest, best = node, strength
-    return best_supported(count, episode, c) if reports.share.shape[1] > 0 else strongest
+    return best_supported(count, episode, c) if strange else strongest
 
 
 @lean_piece
 def _strongest_heard(episode, c):
-    """Of those that a sink has heard of the target the one with the strongest signal, the first by number where signals
-    are alike."""
+    """Of those that a sink has heard the one with the strongest signal, the first by number where signals are alike."""
     state, b = episode.state, episode.b
     target = target_of(state, b)
     strongest, best = np.int64(-1), -np.inf
     for k in range(state.reports.count[b]):
         node: Any = np.int64(state.reports.node[b, k])
-        if not is_of_target(state.reports, b, k):
-            continue
         sensor = node_at(state.network.positions[b], node)
         occasion, x, y = what_is_sensed(state, b, sensor, True, target, c)
         strength = signal(c.measurement, occasion, sensor, x, y)
@@ -131,14 +130,13 @@ def _strongest_heard(episode, c):
 def _restart_at_centroid(state, b, c):
     """Position belief about the centroid of the nodes heard of the target, sd r_s / sqrt(n); the velocity's stays.
     Returns whether any was."""
-    reports, positions, heard = state.reports, state.network.positions[b], heard_of_target(state.reports, b)
-    if heard == 0:
-        return False
-    x, y = 0.0, 0.0
+    reports, positions = state.reports, state.network.positions[b]
+    heard, x, y = 0, 0.0, 0.0
     for k in range(reports.count[b]):
         if is_of_target(reports, b, k):
-            x += positions[reports.node[b, k], 0]
-            y += positions[reports.node[b, k], 1]
+            heard, x, y = heard + 1, x + positions[reports.node[b, k], 0], y + positions[reports.node[b, k], 1]
+    if heard == 0:
+        return False
     mean, cov = state.belief.row[b].mean, state.belief.row[b].cov
     mean[0], mean[2] = x / heard, y / heard
     for axis in (0, 2):

@@ -10,7 +10,7 @@ from wsn_env.simulation import messages
 from wsn_env.simulation.faults import hold_back, what_is_sensed
 from wsn_env.simulation.messages import Episode
 from wsn_env.simulation.truth import memory_of
-from wsn_env.simulation.unnamed import sense_all
+from wsn_env.simulation.unnamed import in_doubt, sense_all
 
 
 @lean_piece
@@ -40,7 +40,7 @@ def sense(node: Any, head: Any, purpose: Any, target: Any, episode: Episode, c: 
     state, b, out = episode.state, episode.b, episode.out
     if state.residual_j[b, node] <= 0.0:
         return
-    if state.reports.share.shape[1] > 0:
+    if in_doubt(episode, c):
         sense_all(node, head, purpose, episode, c)
         return
     sensor = node_at(state.network.positions[b], node)
@@ -63,6 +63,8 @@ def _take_report(slot, node, report, episode, c):
     reports.node[b, slot] = node
     reports.value[b, slot, 0] = value
     reports.value[b, slot, 1] = second
+    if reports.share.shape[1] > 0:
+        reports.share[b, slot] = 1.0
     reports.count[b] += 1
     take_note(c.measurement, memory_of(state, b), node, value)
 

@@ -17,6 +17,12 @@ MOST_FALSE = 64  # false measurements, for which there are random numbers
 
 
 @lean_piece
+def in_doubt(episode: Episode, c: Any) -> bool:
+    """Whether a report may be of something else than the row's target: it does not say it, and there is something."""
+    return episode.state.reports.share.shape[1] > 0 and (episode.targets > 1 or c.clutter > 0.0)
+
+
+@lean_piece
 def sense_all(node: Any, head: Any, purpose: Any, episode: Episode, c: Any) -> None:
     """An awake node's period: it reports all that it measures, by the first number, in as many packets as it takes."""
     state, b, out = episode.state, episode.b, episode.out
@@ -95,11 +101,21 @@ def sensed_thing(k: int, sensor: Any, asked: bool, episode: Episode, c: Any) -> 
 
 @lean_piece
 def _one_with(s, episode, c):
-    """The first target that target s is one with, by way of others between them; itself: none."""
+    """The first target that target s is one with, by way of others; itself: none."""
+    if c.merged_m <= 0.0:
+        return s
     state, first, period = episode.state, episode.first, episode.state.row[episode.b].period
-    for other in range(s - 1, -1, -1):
-        ax, ay = target_at(state, first + s, period)
-        bx, by = target_at(state, first + other, period)
-        if (ax - bx) ** 2 + (ay - by) ** 2 < c.merged_m * c.merged_m:
-            s = other
-    return s
+    together, grown = 0, 1 << s  # sets of targets
+    while grown != together:
+        together = grown
+        for a in range(episode.targets):
+            for b in range(episode.targets):
+                if together >> a & 1 and not together >> b & 1:
+                    ax, ay = target_at(state, first + a, period)
+                    bx, by = target_at(state, first + b, period)
+                    if (ax - bx) ** 2 + (ay - by) ** 2 < c.merged_m * c.merged_m:
+                        grown |= 1 << b
+    lowest = 0
+    while not together >> lowest & 1:
+        lowest += 1
+    return lowest

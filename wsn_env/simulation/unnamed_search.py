@@ -6,6 +6,7 @@ import numpy as np
 
 from wsn_env.compiled.elementary import log
 from wsn_env.compiled.kernels import lean_piece
+from wsn_env.models.association.base import is_of_target
 from wsn_env.models.association.fit import (
     GOLDEN_COS,
     GOLDEN_SIN,
@@ -78,16 +79,17 @@ def best_supported(count: int, episode: Episode, c: Any) -> Any:
     best, most = np.int64(-1), -np.inf
     for k in range(count):
         node: Any = np.int64(state.reports.node[b, k])
-        support, _, _ = _best_point(node, count, episode, c)
-        if support > most:
-            best, most = node, support
+        if k == 0 or node != state.reports.node[b, k - 1]:
+            support, _, _ = _best_point(node, count, episode, c)
+            if support > most:
+                best, most = node, support
     return best
 
 
 @lean_piece
 def mark_supported(head: Any, rows: np.ndarray, found: np.ndarray, episode: Episode, c: Any) -> None:
     """Of all that has been reported after a search, the target's is what the best point next to the new head explains
-    and no other target does."""
+    and no other target does, of each node one measurement at most."""
     state, b = episode.state, episode.b
     reports, positions = state.reports, state.network.positions[b]
     for k in range(reports.count[b]):
@@ -95,22 +97,50 @@ def mark_supported(head: Any, rows: np.ndarray, found: np.ndarray, episode: Epis
         strange = _is_strange(sensor, value, rows, found, episode, c)
         reports.share[b, k] = _density_of_false(sensor, value, c) if strange else np.inf
     _, x, y = _best_point(head, reports.count[b], episode, c)
-    for k in range(reports.count[b]):
-        reports.share[b, k] = _odds(k, x, y, episode, c) > 1.0
+    start = 0
+    while start < reports.count[b]:
+        stop, odds, best, highest = start, 0.0, start, -1.0
+        while stop < reports.count[b] and reports.node[b, stop] == reports.node[b, start]:
+            own = _odds(stop, x, y, episode, c)
+            odds += own
+            if own > highest:
+                best, highest = stop, own
+            reports.share[b, stop] = 0.0
+            stop += 1
+        if odds > 1.0:
+            reports.share[b, best] = 1.0
+        start = stop
+
+
+@lean_piece
+def nearest_of_target(episode: Episode) -> Any:
+    """Of the nodes whose reports are the target's the one nearest to the estimate."""
+    state, b = episode.state, episode.b
+    mean, nearest, least = state.belief.row[b].mean, np.int64(-1), np.inf
+    for k in range(state.reports.count[b]):
+        if is_of_target(state.reports, b, k):
+            node: Any = np.int64(state.reports.node[b, k])
+            squared = squared_distance(state.network.positions[b], node, mean[0], mean[2])
+            if squared < least:
+                nearest, least = node, squared
+    return nearest
 
 
 @lean_piece
 def _best_point(node, count, episode, c):
     """Of points within a node's sensing radius that where a target best explains a list, and the silence of who is not
     in it: log of the odds, x, y [m]."""
-    place = episode.state.network.positions[episode.b, node]
+    place, reports = episode.state.network.positions[episode.b, node], episode.state.reports
     best, best_x, best_y, cos, sin = -np.inf, place[0], place[1], 1.0, 0.0
     for i in range(POINTS):
         far = c.radius_m * np.sqrt((i + 0.5) / POINTS)
         x, y = place[0] + far * cos, place[1] + far * sin
-        support = _log_silence(x, y, episode, c)
+        support, odds = _log_silence(x, y, episode, c), 0.0
         for k in range(count):
-            support += log(1.0 + _odds(k, x, y, episode, c))
+            if k > 0 and reports.node[episode.b, k] != reports.node[episode.b, k - 1]:
+                support, odds = support + log(1.0 + odds), 0.0
+            odds += _odds(k, x, y, episode, c)  # a node measures a target once at most
+        support += log(1.0 + odds)
         if support > best:
             best, best_x, best_y = support, x, y
         cos, sin = cos * GOLDEN_COS - sin * GOLDEN_SIN, sin * GOLDEN_COS + cos * GOLDEN_SIN

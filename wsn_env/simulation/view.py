@@ -168,9 +168,21 @@ class View:
 
     @cached_property
     def _of_target(self) -> np.ndarray:
-        """Which of the reports are of the row's target; where they do not say it, probably, at most one a node."""
+        """Which of the reports are of the row's target. Where they do not say it: of each node that has probably
+        measured it the likeliest one, the first of those alike."""
         valid = np.arange(self.reports.node.shape[1]) < self.reports.count[:, None]
-        return valid & (self.reports.share >= 0.5) if self.reports.share.shape[1] else valid
+        if not self.reports.share.shape[1]:
+            return valid
+        rows, slots = np.nonzero(valid)
+        nodes, shares = self.reports.node[rows, slots], self.reports.share[rows, slots]
+        sums, most = np.zeros(self.positions.shape[:2]), np.zeros(self.positions.shape[:2])
+        np.add.at(sums, (rows, nodes), shares)
+        np.maximum.at(most, (rows, nodes), shares)
+        likeliest = (sums[rows, nodes] >= 0.5) & (shares == most[rows, nodes])
+        place = rows * self.positions.shape[1] + nodes
+        likeliest &= np.isin(np.arange(len(rows)), np.unique(np.where(likeliest, place, -1), return_index=True)[1])
+        valid[rows, slots] = likeliest
+        return valid
 
     @cached_property
     def measured(self) -> np.ndarray:
@@ -234,6 +246,8 @@ class View:
         } | {name: self.belief[name].reshape(len(self.row), -1).copy() for name in MOVING}
         if self.receivers.shape[1]:
             arrays |= {name: self.receivers[name].copy() for name in HEARING}
+        if self.row["targets"].max(initial=0) > 1:
+            arrays["targets"] = self.row["targets"][:, None].astype(np.int64)
         return arrays | ({"bitmap": self.reports.bitmap.copy()} if self.reports.bitmap.shape[1] else {})
 
     @classmethod
@@ -266,6 +280,7 @@ class View:
             known.belief[name] = a[name].reshape(known.belief[name].shape)
         for name in HEARING if known.receivers.size else ():
             known.receivers[name] = a[name]
+        known.row["targets"] = a["targets"].reshape(rows) if "targets" in a else 1
 
         network, reports = known.network, known.reports
         network.positions[:], network.battery[:] = a["positions"], a["battery"]

@@ -63,13 +63,27 @@ def weigh_reports(a: Any, head: AtHead, c: Any, maps: np.ndarray, scratch: Any) 
 
 @lean_piece
 def heard_of_target(reports: Any, b: int) -> int:
-    """How many of a row's reports are of its target, or probably so where they do not say it."""
+    """How many reports of its target a row has; where they do not say it, 1 or 0: whether any node has probably
+    measured it, whichever of its measurements that is."""
     if reports.share.shape[1] == 0:
         return reports.count[b]
-    count = 0
+    missed, own = 1.0, 0.0
     for k in range(reports.count[b]):
-        count += is_of_target(reports, b, k)
-    return count
+        if k > 0 and reports.node[b, k] != reports.node[b, k - 1]:
+            missed, own = missed * (1.0 - own), 0.0
+        own = min(own + reports.share[b, k], 1.0)
+    return 1 if missed * (1.0 - own) <= 0.5 else 0
+
+
+@lean_piece
+def expected_reports(reports: Any, b: int) -> float:
+    """How many reports of its target a row has; where they do not say it, the expected number."""
+    if reports.share.shape[1] == 0:
+        return float(reports.count[b])
+    total = 0.0
+    for k in range(reports.count[b]):
+        total += reports.share[b, k]
+    return total
 
 
 @lean_piece

@@ -66,17 +66,18 @@ class Unknown(Association):
 
     def check(self, scenario: Scenario) -> None:
         """Only reports of a position or of a strength, weighed one by one."""
-        kind, t = type(self).__name__, scenario.tracking
-        measured = type(scenario.measurement).__name__
+        kind, t, m = type(self).__name__, scenario.tracking, scenario.measurement
+        robust = f"{t.gate_sds}, {t.outlier_share}, {t.node_sd_m}"
         wrong = {
             f"Scenario.targets = {scenario.targets}: allowed are up to {MOST_TARGETS}": scenario.targets > MOST_TARGETS,
-            f"Scenario.measurement = {measured}: allowed are reports of the target alone":
-                not scenario.measurement.independent,
-            "Scenario.faults: allowed are those of the motion": any(fault.strikes for fault in scenario.faults),
+            f"Scenario.measurement = {type(m).__name__}: allowed are reports of a position or a strength":
+                not m.independent,
+            f"Scenario.faults = {scenario.faults}: allowed are those of the motion":
+                any(fault.strikes for fault in scenario.faults),
             f"Tracking.tracker = {t.tracker!r}: allowed is 'particle'": t.tracker != "particle",
             f"Tracking.fusion = {t.fusion!r}: allowed is 'joint'": t.fusion != "joint",
             "Tracking.silent_information = True: allowed is False": t.silent_information,
-            "Tracking.gate_sds, outlier_share, node_sd_m: allowed are None, 0, 0": t.robust,
+            f"Tracking.gate_sds, outlier_share, node_sd_m = {robust}: allowed are None, 0, 0": t.robust,
         }  # fmt: skip
         for what, given in wrong.items():
             if given:
