@@ -56,7 +56,8 @@ def test_actions_and_observations_are_all_there():
     assert set(re.findall(r"^\*\*`\"(\w+)\"`\*\*", TEXT, re.M)) == set(OBSERVATIONS)
     told = first_cells(section("| `period` | int", "## Info"))
     spaces = [wsn_env.ClusterEnv(name, observation="view").observation_space.spaces for name in ("Binary-v0", "Ble-v0")]
-    assert told == spaces[0].keys() | spaces[1].keys()
+    spaces.append(wsn_env.MultiEnv(observation="view").observation_space.spaces)
+    assert told == set().union(*spaces)
 
 
 @pytest.mark.parametrize("observation", ["candidates", "menu"])

@@ -20,19 +20,9 @@ class Nearest(Unknown):
     """
 
     @staticmethod
-    def associate(  # noqa: PLR0913
-        a: Any,
-        node: Any,
-        values: np.ndarray,
-        shares: np.ndarray,
-        tracks: np.ndarray,
-        own: int,
-        x: np.ndarray,
-        log_weights: np.ndarray,
-        scratch: Any,
-        c: Any,
-    ) -> None:
+    def associate(a: Any, heard: Any, tracks: np.ndarray, own: int, cloud: Any, c: Any) -> None:
         """Weigh the particles with what one node has measured; as Unknown.associate."""
+        node, values, shares = heard
         best, least = -1, a.association_sds * a.association_sds
         if len(values) == 1 and len(tracks) == 1 and a.clutter == 0.0:  # nothing else can have made it
             least = np.inf
@@ -45,4 +35,4 @@ class Nearest(Unknown):
             for k in range(5):
                 tracks[own, k] = corrected[k]
             shares[best] = 1.0
-            weigh(c.measurement, x[0], x[2], log_weights, node, values[best])
+            weigh(c.measurement, cloud.x[0], cloud.x[2], cloud.log_weights, node, values[best])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,22 @@ if TYPE_CHECKING:
 
 MOST_TARGETS = 8  # sums run over all sets of them
 LEAST = F(1e-30)
+
+
+class Heard(NamedTuple):
+    """What a head has heard of one node."""
+
+    node: Any  # Node
+    values: np.ndarray  # (n, 2) its measurements
+    shares: np.ndarray  # (n,) the probability that each is of the head's own target; at first 0
+
+
+class Cloud(NamedTuple):
+    """A head's particles."""
+
+    x: np.ndarray  # (4, P)
+    log_weights: np.ndarray  # (P,)
+    scratch: np.ndarray  # (P,) to write to
 
 
 @dataclass(frozen=True)
@@ -86,7 +102,7 @@ class Unknown(Association):
     @staticmethod
     def weigh_reports(a: Any, head: AtHead, c: Any, maps: np.ndarray, scratch: Any) -> None:
         belief, network, reports, b = head
-        own, x, log_weights = b % c.targets, belief.particles[b], belief.log_weights[b]
+        own, cloud = b % c.targets, Cloud(belief.particles[b], belief.log_weights[b], scratch)
         tracks = np.empty((c.targets, 5))  # where this head takes each target to be: a PositionBelief
         for s in range(c.targets):
             mean, cov = belief.row[b - own + s].predicted_mean, belief.row[b - own + s].predicted_cov
@@ -97,34 +113,23 @@ class Unknown(Association):
             stop = start + 1
             while stop < count and reports.node[b, stop] == reports.node[b, start]:
                 stop += 1
-            node, shares = node_at(network.positions[b], reports.node[b, start]), reports.share[b, start:stop]
-            shares[:] = 0.0
-            associate(a, node, reports.value[b, start:stop], shares, tracks, own, x, log_weights, scratch, c)
+            node, values = node_at(network.positions[b], reports.node[b, start]), reports.value[b, start:stop]
+            reports.share[b, start:stop] = 0.0
+            associate(a, Heard(node, values, reports.share[b, start:stop]), tracks, own, cloud, c)
             start = stop
 
     @staticmethod
-    def associate(  # noqa: PLR0913
-        a: Any,
-        node: Any,
-        values: np.ndarray,
-        shares: np.ndarray,
-        tracks: np.ndarray,
-        own: int,
-        x: np.ndarray,
-        log_weights: np.ndarray,
-        scratch: Any,
-        c: Any,
-    ) -> None:
+    def associate(a: Any, heard: Any, tracks: np.ndarray, own: int, cloud: Any, c: Any) -> None:
         """Weigh the particles with what one node has measured.
 
         Args:
-            values: (n, 2) its measurements.
-            shares: (n,) filled: the probability that each is of the head's own target.
-            tracks: (M, 5) where each target is, as a PositionBelief; corrected.
+            heard: Heard, whose shares are to be filled.
+            tracks: (M, 5) where each target is taken to be, as a PositionBelief; corrected.
             own: the head's own target.
-            x, log_weights, scratch: its particles (4, P), to weigh, and (P,) to write to.
+            cloud: its Cloud, to weigh.
         """
-        (targets, _), n = tracks.shape, len(values)
+        (node, values, shares), (x, log_weights, scratch) = heard, cloud
+        targets, n = len(tracks), len(values)
         others = a.clutter + LOST * (targets > 1)
         if n == 1 and others == 0.0:  # nothing else can have made it
             shares[0] = 1.0
