@@ -263,6 +263,17 @@ def test_the_bits_do_not_depend_on_batch_or_threads():
         assert (part.reports.count == whole.reports.count[: 3 * fields]).all()
 
 
+def test_what_has_not_arrived_stands_nowhere():
+    """A sink that hears nothing: its list is empty, also behind its end, whatever nodes have measured and tried."""
+    scenario = Scenario.named("PreDC-v0", targets=2, receiver="sink", packet_success=0.0, **CONFUSED)
+    searches = detections = 0
+    for state, outcome in play(scenario, "nearest8"):
+        detections, searches = detections + outcome.detections.sum(), searches + outcome.searched.sum()
+        for values in (state.reports.value, state.reports.share, state.reports.count):
+            assert (values == 0).all()
+    assert detections > 100 and searches > 5
+
+
 def test_views_have_what_is_probably_the_targets():
     scenario = Scenario.named("PreDC-v0", targets=2, motion="meeting", **CONFUSED)
     others = 0

@@ -14,6 +14,7 @@ from wsn_env.models.state import Cluster
 
 SMALL = dict(particles=200, periods=30)
 POOR = SMALL | dict(battery_j=0.0003, nodes=100)  # nodes die in dozens
+UNNAMED = POOR | dict(association="unknown", clutter=0.5, resolution_m=2.0, motion="meeting")
 MODEM = dict(radio="modem", hop_m=200.0, **SMALL)
 
 
@@ -64,7 +65,9 @@ def test_the_first_of_several_is_the_single_target_where_energy_lasts(targets):
 
 
 @pytest.mark.parametrize("targets", [1, 2, 3, 4, 5])
-@pytest.mark.parametrize("settings", [SMALL, POOR, MODEM, SMALL | dict(sensing_nj=2000.0)], ids=lambda s: str(len(s)))
+@pytest.mark.parametrize(
+    "settings", [SMALL, POOR, MODEM, SMALL | dict(sensing_nj=2000.0), UNNAMED], ids=lambda s: str(len(s))
+)
 def test_nodes_and_batteries_are_shared(targets, settings):
     """What all targets' periods cost is what the batteries have lost, at any moment; the dead serve nobody."""
     scenario = Scenario.named("PreDC-v0", targets=targets, **settings)

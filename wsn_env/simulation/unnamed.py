@@ -46,6 +46,16 @@ def sense_all(node: Any, head: Any, purpose: Any, episode: Episode, c: Any) -> N
         out.detections += 1
         if messages.report(node, head, length, purpose, episode, c.radio):
             reports.count[b] = n
+        else:
+            forget(reports, b, start, n)
+
+
+@lean_piece
+def forget(reports: Any, b: int, start: int, stop: int) -> None:
+    """Clear places of a row's list: what has not arrived nobody may read there."""
+    for k in range(start, min(stop, reports.node.shape[1])):
+        reports.node[b, k], reports.share[b, k] = 0, 0.0
+        reports.value[b, k, 0], reports.value[b, k, 1] = 0.0, 0.0
 
 
 @lean_piece

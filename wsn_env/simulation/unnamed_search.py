@@ -22,7 +22,7 @@ from wsn_env.models.measurement.base import PositionBelief, news, node_at
 from wsn_env.simulation.geometry import cells_within
 from wsn_env.simulation.messages import Episode
 from wsn_env.simulation.truth import memory_of
-from wsn_env.simulation.unnamed import false_measurements, sensed_thing
+from wsn_env.simulation.unnamed import false_measurements, forget, sensed_thing
 
 
 @lean_piece
@@ -73,7 +73,7 @@ def _density_of_false(sensor, value, c):
 def best_supported(count: int, episode: Episode, c: Any) -> Any:
     """Of the nodes in a list the one next to which a target would explain most of it; -1: the list is empty.
 
-    What is true is measured by several nodes alike, what is false by one.
+    What is true is measured by several nodes alike, what is false by one. The list is cleared.
     """
     state, b = episode.state, episode.b
     best, most = np.int64(-1), -np.inf
@@ -83,6 +83,7 @@ def best_supported(count: int, episode: Episode, c: Any) -> Any:
             support, _, _ = _best_point(node, count, episode, c)
             if support > most:
                 best, most = node, support
+    forget(state.reports, b, 0, count + 1)  # one more has been tried
     return best
 
 
