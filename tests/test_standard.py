@@ -39,6 +39,15 @@ def test_the_references_are_what_the_policies_play(played):
     assert any(reference.best == "ppo" for reference in references()["PreDC-v0"].values())
 
 
+def test_so_are_those_of_several_targets():
+    for lam, reference in references()["Multi-v0"].items():
+        if reference.best == "greedy":
+            own = standard.block_returns(play_standard(["greedy"], "Multi-v0", 50), "greedy", lam)
+            assert own == pytest.approx(reference.best_returns[:1], abs=1e-4)
+            return
+    pytest.fail("greedy is nowhere the best")
+
+
 def test_random_choices_have_0_and_the_best_has_1(played):
     known = {
         lam: Reference("ppo", standard.block_returns(played, "ppo", lam), played.values("random", lam, "return").mean())
