@@ -47,7 +47,7 @@ class Greedy(ViewPolicy):
     make up for the handover. Each row takes the terms whose lam is nearest to its own on the logarithmic scale.
 
     Several targets of a field choose one after the other, twice; a node that is in the cluster of another is awake
-    anyhow: being awake has no price, also where it leads.
+    anyhow: only its report has a price, and half of what is saved counts for its leading.
     """
 
     terms: Sequence[Sequence[float]] | None = None  # None: tuned for the scenario's name; else usual ones

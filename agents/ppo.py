@@ -100,8 +100,9 @@ class PPOPolicy(ViewPolicy):
                 raise ValueError(f"(action, observation) = {pair}: must be one of {INTERFACES}")
             # It may have been trained without what observations tell in this scenario.
             interfaces = [
-                Interface(self.scenario.override(scarce_energy=scarce), settings)
+                Interface(self.scenario.override(scarce_energy=scarce, tells_others=others), settings)
                 for scarce in dict.fromkeys((self.scenario.scarce_energy, False))
+                for others in dict.fromkeys((self.scenario.tells_others, False, True))
             ]
         except (TypeError, ValueError) as problem:
             raise ValueError(f"{path} is not a saved policy: {problem}") from None

@@ -15,6 +15,8 @@ from typing import Any
 from wsn_env import Scenario
 from wsn_env.envs.feature import Feature
 from wsn_env.envs.features import BELIEF_FEATURES, CANDIDATE_FEATURES, MOTION_FEATURES
+from wsn_env.envs.others import ENTRY_FEATURES as ACTION_OTHERS
+from wsn_env.envs.others import OTHER_FEATURES
 from wsn_env.envs.prospects import ENERGY_FEATURES as ACTION_ENERGY
 from wsn_env.envs.prospects import ENTRY_FEATURES
 from wsn_env.envs.scarcity import ENERGY_FEATURES
@@ -30,6 +32,8 @@ OBSERVED: dict[str, dict[str, Feature]] = {
     "action": ENTRY_FEATURES,
     "belief_energy": ENERGY_FEATURES,
     "action_energy": ACTION_ENERGY,
+    "belief_others": OTHER_FEATURES,
+    "action_others": ACTION_OTHERS,
 }
 SECTIONS = {"scenario": Scenario, "field": Field, "tracking": Tracking}
 ROLES: dict[str, Registry] = {

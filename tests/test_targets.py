@@ -199,6 +199,55 @@ def test_scarce_energy_is_that_of_all_targets():
     assert supply[0] == pytest.approx(3 * supply[1])
 
 
+def named_columns(env, observation, prefix):
+    """The columns whose names begin so, by name."""
+    names = list(env.rows.interface.observation.features)
+    return {name: observation[..., k] for k, name in enumerate(names) if name.startswith(prefix)}
+
+
+def test_observations_tell_of_other_targets():
+    """Against positions and clusters as they are; one target is told of none, and all else as without."""
+    settings = SMALL | dict(observation="menu", motion="meeting", autoreset_mode="Disabled")
+    envs = MultiVectorEnv(4, targets=3, tells_others=True, **settings)
+    plain = MultiVectorEnv(4, targets=3, **settings)
+    seen, without = envs.reset(seed=2)[0], plain.reset(seed=2)[0]
+    radius_m, shared = envs.scenario.radius_m, 0
+    for step in range(SMALL["periods"]):
+        view = envs.view
+        places, members = view.prediction.reshape(4, 3, 2) / radius_m, view.member.reshape(4, 3, -1)
+        apart = np.linalg.norm(places[:, :, None] - places[:, None], axis=-1)
+        about = np.exp(-0.5 * apart**2).sum(axis=2) - 1
+        told = named_columns(envs, seen, "other")
+        assert told["others_near"] == pytest.approx(about, abs=1e-5)
+        nearest = np.where(np.eye(3, dtype=bool), np.inf, apart).min(axis=2)
+        distance = np.hypot(told["other_ahead"], told["other_left"])
+        assert distance[nearest < 10] == pytest.approx(nearest[nearest < 10], rel=1e-4)
+        standing = named_columns(envs, seen, "shared[0]")["shared[0]"]
+        both = [[(members[i, t] & members[i, [t - 1, t - 2]].any(axis=0)).sum() for t in range(3)] for i in range(4)]
+        assert 4 * standing == pytest.approx(np.array(both))
+        shared += np.sum(both)
+        names = list(envs.rows.interface.observation.features)
+        kept = [not name.startswith(("other", "shared")) for name in names]
+        assert (seen[..., kept] == without).all()
+        actions = np.full((4, 3), 10 + step % 9)
+        seen, without = envs.step(actions)[0], plain.step(actions)[0]
+    assert shared > 50
+    alone = MultiVectorEnv(3, targets=1, tells_others=True, observation="menu", **SMALL)
+    seen = alone.reset(seed=0)[0]
+    for prefix in ("other", "shared"):
+        assert all((column == 0).all() for column in named_columns(alone, seen, prefix).values())
+
+
+def test_a_network_is_shown_what_it_was_trained_with():
+    """The pretrained one knows nothing of others, wherever it plays."""
+    choices = []
+    for tells_others in (False, True):
+        scenario = Scenario.named("PreDC-v0", targets=3, tells_others=tells_others, **SMALL)
+        *_, (state, _) = play(World(scenario), "ppo", 3)
+        choices.append(state.belief.mean)
+    assert (choices[0] == choices[1]).all()
+
+
 # --- faces --------------------------------------------------------------------------------------------------
 
 

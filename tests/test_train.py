@@ -163,6 +163,7 @@ def test_a_stopped_training_ends_as_one_that_was_never_stopped(run, tmp_path, mo
     [
         ("ends_outside=True", "nodes=30,periods=7"),  # episodes of several lengths, that end outside
         ("targets=2", "targets=3,periods=7,association=unknown,clutter=0.2"),  # in fields of several targets
+        ("tells_others=True", "targets=3,periods=7"),  # with what observations tell of the others
     ],
 )
 def test_so_does_one_in_unequal_worlds(tmp_path, monkeypatch, own, other):

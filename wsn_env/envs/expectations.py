@@ -42,6 +42,7 @@ EXPECTED = record(
         ("price_m", "f8"),  # what an order of merit charges for it
         ("open", "i8"),  # 1: still to be ordered
         ("shared", "i8"),  # 1: awake for another target anyhow
+        ("elsewhere", "i8"),  # 1: stands in the cluster of another target; for observations that tell of others
     ]
 )
 

@@ -9,6 +9,7 @@ from wsn_env.compiled.kernels import lean_piece
 from wsn_env.envs.expectations import Outlook
 from wsn_env.envs.feature import BOUND, Feature, amount, flag, share
 from wsn_env.envs.merit import gain, position_cov, squared_between
+from wsn_env.envs.others import OTHER_FEATURES, describe_others
 from wsn_env.envs.scarcity import ENERGY_FEATURES, describe_energy
 from wsn_env.models.association.base import expected_reports
 from wsn_env.models.motion.modes import COUNT, MODES
@@ -53,14 +54,15 @@ CANDIDATE_FEATURES = {
     "merit_drop": share("drop of the expected sd that the node brings in that order, as a share of the predicted sd"),
 }
 WIDTH = len(CANDIDATE_FEATURES)
-G, E = len(BELIEF_FEATURES), len(ENERGY_FEATURES)
+G, E, OTHERS = len(BELIEF_FEATURES), len(ENERGY_FEATURES), len(OTHER_FEATURES)
 LEAST_SURPRISE = 0.01
 NINTH = 9
 
 
 def belief_features(scenario: Scenario) -> dict[str, Feature]:
     """What observations tell of an environment's belief and of how its target moves; of energy where that is scarce."""
-    return BELIEF_FEATURES | MOTION_FEATURES | (ENERGY_FEATURES if scenario.scarce_energy else {})
+    more = (ENERGY_FEATURES if scenario.scarce_energy else {}) | (OTHER_FEATURES if scenario.tells_others else {})
+    return BELIEF_FEATURES | MOTION_FEATURES | more
 
 
 class Heading(NamedTuple):
@@ -119,6 +121,9 @@ def describe_row(known: Any, b: int, outlook: Outlook, c: Any, f: np.ndarray) ->
     if c.scarce_energy:
         describe_energy(known, b, c, f[end : end + E])
         end += E
+    if c.tells_others:
+        describe_others(known, b, heading, c.radius_m, f[end : end + OTHERS])
+        end += OTHERS
     return heading, end
 
 

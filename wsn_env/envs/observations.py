@@ -23,6 +23,7 @@ from wsn_env.envs.features import (
     describe_row,
 )
 from wsn_env.envs.merit import ORDERS, RANKED, order_row, rank_row
+from wsn_env.envs.others import mark_elsewhere
 from wsn_env.envs.prospects import describe_entries, describe_standing, entry_features, units_of
 from wsn_env.models.measurement.base import Order
 from wsn_env.models.motion.modes import COUNT
@@ -115,6 +116,8 @@ def _encode_menu_of(b, c, known, by, found, ranking, out):
     _, candidates, table = found
     f, outlook = out[b], outlook_of(known, b, candidates, table)
     units = units_of(outlook.lam, c)
+    if c.tells_others:
+        mark_elsewhere(known, b, outlook.nodes)
     heading, first = describe_row(known, b, outlook, c, f)
     width = (len(f) - first) // MENU_ENTRIES
     describe_standing(outlook, heading, units, c, f[first : first + width])

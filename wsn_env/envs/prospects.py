@@ -10,6 +10,7 @@ from wsn_env.envs.expectations import Outlook
 from wsn_env.envs.feature import Feature, amount, flag, share
 from wsn_env.envs.features import Heading
 from wsn_env.envs.merit import PositionCov, gain, position_cov, report_way, squared_between
+from wsn_env.envs.others import ENTRY_FEATURES as OTHERS
 from wsn_env.models.radio.base import reception, transmission
 from wsn_env.scenario import Scenario
 
@@ -35,12 +36,13 @@ ENERGY_FEATURES = {  # behind them, where energy is scarce
     "head_energy": share("energy left in the head, as a share of its battery"),
     "least_energy": share("the same of the node of the cluster that has least"),
 }
-WIDTH, MORE = len(ENTRY_FEATURES), len(ENERGY_FEATURES)
+WIDTH, ENERGIES, SHARED = len(ENTRY_FEATURES), len(ENERGY_FEATURES), len(OTHERS)
 
 
 def entry_features(scenario: Scenario) -> dict[str, Feature]:
     """What observations tell of a discrete action: its predicted outcome."""
-    return ENTRY_FEATURES | (ENERGY_FEATURES if scenario.scarce_energy else {})
+    more = (ENERGY_FEATURES if scenario.scarce_energy else {}) | (OTHERS if scenario.tells_others else {})
+    return ENTRY_FEATURES | more
 
 
 class Units(NamedTuple):
@@ -70,6 +72,7 @@ class Tally(NamedTuple):
     silence: float  # probability that no report comes
     missed_ahead: float  # probability that none detects AHEAD periods on
     least_left: float  # share of the battery of the node that has least
+    shared: int  # nodes that stand in the cluster of another target
 
 
 @lean_piece
@@ -90,6 +93,7 @@ def describe_standing(outlook: Outlook, heading: Heading, units: Units, c: Any, 
             tally = _with_member(tally, outlook, k, head, False, c.radio)
         _write_head(outlook, head, heading, c.radius_m, f)
     _write(len(outlook.nodes) - head - 1, 0, tally, outlook, units, f)
+    _write_more(outlook.nodes[head].left if outlook.nodes[head].node >= 0 else 0.0, tally, c, f)
 
 
 @lean_piece
@@ -109,7 +113,7 @@ def describe_entries(
         head = nodes[leader].node
         tally = _with_head(tally, outlook, leader, c.radio)
     slot, invited = 0, 0
-    width = WIDTH + (MORE if c.scarce_energy else 0)
+    width = WIDTH + (ENERGIES if c.scarce_energy else 0) + (SHARED if c.tells_others else 0)
     for n in range(len(entries) // width):
         f = entries[n * width : (n + 1) * width]
         f[:] = 0.0
@@ -127,6 +131,7 @@ def describe_entries(
         if head >= 0:
             _write_head(outlook, leader, heading, c.radius_m, f)
         _write(n, invited, tally, outlook, units, f)
+        _write_more(nodes[leader].left if head >= 0 else 0.0, tally, c, f)
 
 
 @lean_piece
@@ -140,7 +145,7 @@ def stands(outlook: Outlook, node: int) -> bool:
 
 @lean_piece
 def _nobody(outlook):
-    return Tally(position_cov(outlook.cov), 0.0, 0.0, 1.0, 1.0, 1.0)
+    return Tally(position_cov(outlook.cov), 0.0, 0.0, 1.0, 1.0, 1.0, 0)
 
 
 @lean_piece
@@ -153,6 +158,7 @@ def _counted(tally, node, arrival, joules):
         tally.silence * (1.0 - node.detection * arrival),
         tally.missed_ahead * (1.0 - node.detection_ahead),
         min(tally.least_left, node.left),
+        tally.shared + node.elsewhere,
     )
 
 
@@ -199,8 +205,6 @@ def _write_head(outlook, leader, heading, radius_m, f):
     f[13] = dy * heading.x - dx * heading.y
     f[14] = np.sqrt(dx * dx + dy * dy)
     f[15] = head.detection
-    if len(f) > WIDTH:
-        f[WIDTH] = head.left
 
 
 @lean_piece
@@ -217,5 +221,15 @@ def _write(n, invited, tally, outlook, units, f):
     f[9] = 0.25 * tally.detections
     f[10] = tally.silence
     f[11] = 1.0 - tally.missed_ahead
-    if len(f) > WIDTH:
-        f[WIDTH + 1] = tally.least_left
+
+
+@lean_piece
+def _write_more(left, tally, c, f):
+    """What is told behind ENTRY_FEATURES; `left` is the head's share of its battery."""
+    place = WIDTH
+    if c.scarce_energy:
+        f[place] = left
+        f[place + 1] = tally.least_left
+        place += ENERGIES
+    if c.tells_others:
+        f[place] = 0.25 * tally.shared

@@ -82,13 +82,13 @@ def _common_constants(scenario):
         "neighbourhood_m": neighbourhood_m(scenario),
     }
     plain = [(name, "f8") for name in numbers]
-    flags = [("equal_everywhere", "i8"), ("scarce_energy", "i8")]
+    flags = [("equal_everywhere", "i8"), ("scarce_energy", "i8"), ("tells_others", "i8")]
     # How wide a cell of the map of presence is along x and y, and the map; zeros where nobody asks for it.
     mapped = [("cell_m", "f8", 2), ("presence", "f8", (CELLS, CELLS))]
     made = _zeros([("radio", radio), *flags, *plain, *mapped])
     fill_constants(made["radio"], scenario.radio, scenario)
     made["equal_everywhere"] = scenario.measurement.equal_everywhere
-    made["scarce_energy"] = scenario.scarce_energy
+    made["scarce_energy"], made["tells_others"] = scenario.scarce_energy, scenario.tells_others
     if scenario.scarce_energy:
         made["cell_m"], made["presence"] = np.array(scenario.field.room_m) / CELLS, presence(scenario)
     for name, value in numbers.items():

@@ -31,6 +31,7 @@ class Quantities(TypedDict, total=False):
     typical_energy_mj: float
     error_cap_m: float | None
     scarce_energy: bool
+    tells_others: bool
     unscored: int
     targets: int
     ends_outside: bool

@@ -88,6 +88,7 @@ class Scenario(Section):
     scarce_energy: bool = quantity(
         False, "observations also tell what is left of energy and time", choices=(True, False)
     )
+    tells_others: bool = quantity(False, "observations also tell of a field's other targets", choices=(True, False))
     unscored: int = quantity(0, "periods at the start that rms_m leaves out: acquisition", at_least=0, whole=True)
     targets: int = quantity(
         1,
