@@ -155,6 +155,8 @@ def draw_quantities(rng: Random, sections: dict[str, Any]) -> dict[str, Any]:
                     drawn[item.name],
                     within(drawn[item.name] * 10 ** rng.uniform(0, 2), whole, **allowed),
                 )
+    if "targets" in drawn:  # of which these environments take one
+        drawn["targets"] = 1
     for name in ("periods", "particles"):
         drawn[name] = min(drawn.get(name, SMALL[name]), rng.randint(2, SMALL[name]))
     return drawn
