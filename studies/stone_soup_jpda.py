@@ -62,7 +62,8 @@ class Trackers:
         )
         predictor, self._scenario = Once(transition), scenario
         self._updater = KalmanUpdater(LinearGaussian(4, POSITION, noise_m**2 * two))
-        density = (scenario.association.false_measurements + LOST) / (np.pi * scenario.radius_m**2)
+        clutter: float = scenario.association.clutter  # type: ignore[attr-defined]  # of an Unknown
+        density = (clutter + LOST) / (np.pi * scenario.radius_m**2)
         self._hypothesiser = ByDistance(
             predictor, self._updater, density, prob_gate=Probability(1 - 1e-4), include_all=False
         )

@@ -14,6 +14,7 @@ from wsn_env.scenario.scenario import Scenario
 from wsn_env.scenario.tracks import CELLS, neighbourhood_m, presence
 
 KINDS = ("measurement", "detection", "radio", "association")
+DOUBTS = ("clutter", "resolution_m", "association_sds")  # of associations that name no target; else 0
 
 TRACKING = record(
     [
@@ -103,7 +104,7 @@ _types: dict[np.dtype, np.dtype] = {}
 def _constants(scenario: Scenario) -> np.ndarray:
     t = scenario.tracking
     types = [(name, constants_type(getattr(scenario, name), scenario)) for name in KINDS]
-    plain = [(name, "f8") for name in ("period_s", "radius_m", "reach_m", "ring_m", "clutter", "merged_m", "gate_sds")]
+    plain = [(name, "f8") for name in ("period_s", "radius_m", "reach_m", "ring_m", *DOUBTS)]
     made = _zeros([*types, ("tracking", TRACKING), ("targets", "i8"), *plain])
     for name in KINDS:
         fill_constants(made[name], getattr(scenario, name), scenario)
@@ -139,8 +140,8 @@ def _constants(scenario: Scenario) -> np.ndarray:
     )
     for name, value in tracking.items():
         made["tracking"][name] = value
-    known = scenario.association
-    made["clutter"], made["merged_m"], made["gate_sds"] = known.false_measurements, known.merged_m, known.gate_sds
+    for name in DOUBTS:
+        made[name] = getattr(scenario.association, name, 0.0)
     for name in ("period_s", "radius_m", "reach_m", "ring_m"):
         made[name] = getattr(scenario, name)
     return made

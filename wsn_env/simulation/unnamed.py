@@ -112,7 +112,7 @@ def sensed_thing(k: int, sensor: Any, asked: bool, episode: Episode, c: Any) -> 
 @lean_piece
 def _one_with(s, episode, c):
     """The first target that target s is one with, by way of others; itself: none."""
-    if c.merged_m <= 0.0:
+    if c.resolution_m <= 0.0:
         return s
     state, first, period = episode.state, episode.first, episode.state.row[episode.b].period
     together, grown = 0, 1 << s  # sets of targets
@@ -123,7 +123,7 @@ def _one_with(s, episode, c):
                 if together >> a & 1 and not together >> b & 1:
                     ax, ay = target_at(state, first + a, period)
                     bx, by = target_at(state, first + b, period)
-                    if (ax - bx) ** 2 + (ay - by) ** 2 < c.merged_m * c.merged_m:
+                    if (ax - bx) ** 2 + (ay - by) ** 2 < c.resolution_m * c.resolution_m:
                         grown |= 1 << b
     lowest = 0
     while not together >> lowest & 1:

@@ -59,7 +59,7 @@ def _is_strange(sensor, value, rows, found, episode, c):
         if row != episode.b and (found[row] or not rows[row]):
             mean, cov = episode.state.belief.row[row].mean, episode.state.belief.row[row].cov
             track = PositionBelief(mean[0], mean[2], cov[0, 0], cov[0, 2], cov[2, 2])
-            if fit(sensor, value, track, c).squares <= c.gate_sds * c.gate_sds:
+            if fit(sensor, value, track, c).squares <= c.association_sds * c.association_sds:
                 return False
     return True
 

@@ -33,21 +33,6 @@ class Association(Kind):
 
     names_targets: ClassVar[bool] = True  # whether a report says of which target it is
 
-    @property
-    def false_measurements(self) -> float:
-        """Their mean number, for an awake node in a period; here there are none."""
-        return 0.0
-
-    @property
-    def merged_m(self) -> float:
-        """Targets nearer to each other than this are one to a node [m]; here none are."""
-        return 0.0
-
-    @property
-    def gate_sds(self) -> float:
-        """A measurement farther off a target's prediction than so many sds is not of it."""
-        return np.inf
-
     def room_a_node(self, targets: int) -> int:
         """How many measurements one node reports at most."""
         return 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -15,8 +15,6 @@ from wsn_env.models.measurement.base import AtHead, weigh_period
 @dataclass(frozen=True)
 class Known(Association):
     """Every report says of which target it is (the default): tagged targets, or one alone."""
-
-    allocates: ClassVar[bool] = True  # as measurements may
 
     @staticmethod
     def weigh_reports(a: Any, head: AtHead, c: Any, maps: np.ndarray, scratch: Any) -> None:

@@ -61,21 +61,6 @@ class Unknown(Association):
 
     names_targets: ClassVar[bool] = False
 
-    @property
-    def false_measurements(self) -> float:
-        """`clutter`."""
-        return self.clutter
-
-    @property
-    def merged_m(self) -> float:
-        """`resolution_m`."""
-        return self.resolution_m
-
-    @property
-    def gate_sds(self) -> float:
-        """`association_sds`."""
-        return self.association_sds
-
     def room_a_node(self, targets: int) -> int:
         """One for each target, and as many false ones as hardly ever come."""
         return targets + (int(4 + 2 * self.clutter + 4 * self.clutter**0.5) if self.clutter else 0)
